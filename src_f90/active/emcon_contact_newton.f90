@@ -8,13 +8,14 @@
 module emcon_contact_newton
    use emcon_condensation, only : condensation_free, condensation_make, condensation_move, &
       condensation_renew, condensation_t, condensation_take
-   use emcon_constraint, only : condition_rate
+   use emcon_constraint, only : condition_rate, most_slips
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
       constraints_take_hold
    use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_force, contact_problem_status, contact_problem_stiffness, contact_problem_t
+   use emcon_contact_trials, only : contact_slope_t
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
@@ -33,7 +34,7 @@ module emcon_contact_newton
    use emcon_system, only : system_respond, system_tangent_times, system_t
    implicit none
    private
-   public :: contact_newton_solve
+   public :: contact_newton_t, contact_newton_solve, contact_newton_free
 
    !> Iterates of a solve at most, by those that a set which stands is given; halvings of a
    !> correction that no forces are found after.
@@ -54,79 +55,128 @@ module emcon_contact_newton
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
 
-   !> One solve.
-   type :: solve_t
-      type(condensation_t) :: condensation
-      type(contact_problem_t) :: problem
-      real(wp), allocatable :: mu(:)             !! (n) of the normal force
-      real(wp), allocatable :: push(:, :)        !! (0:n_slip, n) of the condensed contacts
-      type(slip_status_t), allocatable :: status(:)      !! (n) in which way the law is to hold
-      real(wp), allocatable :: old(:), new(:)    !! (n_row) multipliers about a correction
-      real(wp) :: size = huge(1.0_wp)            !! relative residual, and what contacts miss
-      real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)
-      logical :: is_rounding = .false.           !! nothing but round-off is left
-      integer :: n_stall = 0
-      integer :: least_soft = 0                  !! first of `softer` that is tried, 0: none
-      logical :: is_hung = .false.               !! contact alone holds a body
-      logical :: is_searching = .false.          !! no tangent is wanted
-      logical :: is_driven = .false.             !! the next correction meets prescribed motion
-      logical :: turns = .false.                 !! something rubs, and slip has a direction
-      logical :: keeps_tangent = .false.         !! the last one does for the next correction
-      logical :: by_kept = .false.               !! it is a factor that is kept
-   end type solve_t
+   !> One solve, or several one after the other for a step.
+   type :: contact_newton_t
+      type(coulomb_t), allocatable :: law(:)     !! (n) of the contacts; mu = 0: no friction
+      type(condensation_t), private :: condensation
+      type(contact_problem_t), private :: problem
+      type(contact_slope_t), private :: slope    !! of the problem that was solved last
+      integer, allocatable, private :: row(:)    !! what it was condensed for: see `names_of`
+      logical, private :: has_tangent = .false.  !! there is one, of the same rows
+      real(wp), allocatable, private :: push(:, :)       !! (0:n_slip, n) of the condensed contacts
+      !> (n) in which way the law is to hold
+      type(slip_status_t), allocatable, private :: status(:)
+      real(wp), allocatable, private :: old(:), new(:)   !! (n_row) multipliers about a correction
+      !> Relative residual, and what contacts miss: of the iterate, the best and the last one
+      real(wp), private :: size = huge(1.0_wp), best = huge(1.0_wp), last = huge(1.0_wp)
+      logical, private :: is_rounding = .false.  !! nothing but round-off is left
+      integer, private :: n_stall = 0
+      integer, private :: least_soft = 0         !! first of `softer` that is tried, 0: none
+      logical, private :: is_hung = .false.      !! contact alone holds a body
+      logical, private :: is_searching = .false. !! no tangent is wanted
+      logical, private :: turns = .false.        !! something rubs, and slip has a direction
+      logical, private :: is_driven = .false.    !! the next correction meets prescribed motion
+      logical, private :: by_kept = .false.      !! corrections come from a factor that is kept
+      logical, private :: is_condensed = .false. !! by that, or by the tangent
+      !> What was condensed last does for the next correction
+      logical, private :: keeps_tangent = .false.
+   end type contact_newton_t
 
 contains
 
    !> Solve for `motion%du`; on entry a first guess, with the multipliers of `set`, which has rows
-   !> of all slips. `law` is left as it holds at the end.
-   subroutine contact_newton_solve(newton, system, set, law, motion, status, error)
+   !> of all slips. Laws are left as they hold at the end.
+   subroutine contact_newton_solve(self, newton, system, set, motion, status, error)
+      !> With laws; where it has solved the step with the same rows before it begins by that tangent
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
-      type(coulomb_t), intent(inout) :: law(:)   !! (contacts of `set`) mu = 0: no friction
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
-      type(solve_t) :: self
       integer :: k
 
-      call begin(self, newton, set, law)
+      call begin(self, newton, set)
       self%is_hung = newton%is_hung
       call iterate(self, newton, system, set, motion, status, error)
-      call condensation_free(self%condensation)
       if (allocated(error)) return
-      do k = 1, size(law)
-         law(k)%status = self%status(k)
+      do k = 1, size(self%law)
+         self%law(k)%status = self%status(k)
       end do
    end subroutine contact_newton_solve
 
-   !> Nothing is known yet but the multipliers to start from. Without rows of slips the problem has
+   !> Free what solvers hold.
+   subroutine contact_newton_free(self)
+      type(contact_newton_t), intent(inout) :: self
+
+      call condensation_free(self%condensation)
+   end subroutine contact_newton_free
+
+   !> Nothing is known yet but the multipliers to start from, and the tangent of a solve before: of
+   !> use where slip has a direction and nothing is driven. Without rows of slips the problem has
    !> none.
-   subroutine begin(self, newton, set, law)
-      type(solve_t), intent(inout) :: self
+   subroutine begin(self, newton, set)
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(constraint_set_t), intent(in) :: set
-      type(coulomb_t), intent(in) :: law(:)
-      integer :: k, n_slip
+      integer :: row(set%n_row), k, n_slip
 
       call convergence_begin(newton%convergence)
       newton%n_solve = 0
       n_slip = max(0, maxval(set%slip(:set%n_row)))
-      call contact_problem_create(self%problem, n_slip, size(law))
-      do k = 1, size(law)
-         self%problem%slip_target(:, k) = law(k)%slip_target(:n_slip)
-      end do
-      self%mu = law%mu
-      self%turns = n_slip > 1 .and. any(self%mu > 0.0_wp)
-      self%problem%mu = law%mu
-      allocate(self%push(0:n_slip, size(law)), source=0.0_wp)
-      allocate(self%condensation%hold(set%n_row), source=0.0_wp)
-      allocate(self%status(size(law)))
-      allocate(self%old(set%n_row), self%new(set%n_row))
+      self%turns = n_slip > 1 .and. any(self%law%mu > 0.0_wp)
+      row = names_of(set)
+      self%has_tangent = self%has_tangent .and. self%turns .and. .not. any(abs(newton%driven) &
+         > 0.0_wp)
+      if (self%has_tangent) self%has_tangent = size(row) == size(self%row)
+      if (self%has_tangent) self%has_tangent = all(row == self%row)
+      if (.not. self%has_tangent) call begin_anew(self, set, n_slip)
+      self%row = row
+      associate (law => self%law)
+         do k = 1, size(law)
+            self%problem%slip_target(:, k) = law(k)%slip_target(:n_slip)
+         end do
+         if (allocated(self%push)) deallocate(self%push, self%status)
+         allocate(self%push(0:n_slip, size(law)), source=0.0_wp)
+         allocate(self%status(size(law)))
+      end associate
+      self%size = huge(self%size)
+      self%best = self%size
+      self%last = self%size
+      self%n_stall = 0
+      self%least_soft = 0
+      self%is_rounding = .false.
+      self%is_condensed = self%has_tangent
    end subroutine begin
 
+   !> Numbers that tell the rows of sets apart.
+   pure function names_of(set) result(row)
+      type(constraint_set_t), intent(in) :: set
+      integer :: row(set%n_row)
+      integer :: k
+
+      do k = 1, set%n_row
+         row(k) = (1 + most_slips)*set%id(set%condition(k)) + set%slip(k)
+      end do
+   end function names_of
+
+   !> With other rows.
+   subroutine begin_anew(self, set, n_slip)
+      type(contact_newton_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: n_slip              !! of each contact
+
+      call contact_problem_create(self%problem, n_slip, size(self%law))
+      self%problem%mu = self%law%mu
+      if (allocated(self%condensation%hold)) deallocate(self%condensation%hold)
+      allocate(self%condensation%hold(set%n_row), source=0.0_wp)
+      if (allocated(self%old)) deallocate(self%old, self%new)
+      allocate(self%old(set%n_row), self%new(set%n_row))
+   end subroutine begin_anew
+
    subroutine iterate(self, newton, system, set, motion, status, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -145,6 +195,7 @@ contains
          ! The correction to come from here may be the last one, or by the tangent that there is.
          self%is_searching = (i > 0 .and. (self%size <= no_search .or. self%turns)) .or. &
             (self%by_kept .and. newton%correction%kept%is_made)
+         if (i == 0) self%is_searching = self%is_searching .or. self%has_tangent
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
@@ -172,19 +223,19 @@ contains
 
    !> May corrections come from a factor that is kept?
    pure logical function may_keep(self, newton, system, set)
-      type(solve_t), intent(in) :: self
+      type(contact_newton_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
 
       may_keep = factor_policy_may_provide(newton%factor_policy) .and. .not. (self%is_hung .or. &
-         self%is_driven) .and. kept_factor_has_room(newton%correction%kept, set%n_row, &
-         size(system%matrix%column))
+         self%is_driven .or. self%has_tangent) .and. kept_factor_has_room( &
+         newton%correction%kept, set%n_row, size(system%matrix%column))
    end function may_keep
 
    !> The correction from here: by the last tangent, by a factor that is kept, or by a new tangent.
    subroutine find_correction(self, newton, system, set, motion, status, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -216,7 +267,7 @@ contains
 
    !> Let there be a tangent, unless the last one is kept.
    subroutine find_tangent(self, newton, system, set, motion, status, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -240,7 +291,7 @@ contains
 
    !> Is the step solved?
    pure logical function is_done(self, newton)
-      type(solve_t), intent(in) :: self
+      type(contact_newton_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
 
       is_done = self%size <= round_off
@@ -251,7 +302,7 @@ contains
 
    !> How long ago was the last clear gain?
    subroutine count_stall(self)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
 
       self%n_stall = self%n_stall + 1
       if (self%size < 0.5_wp*self%best) self%n_stall = 0
@@ -261,7 +312,7 @@ contains
 
    !> Residual and rows at the motion; the last correction is halved as long as there are none.
    subroutine measure_damped(self, newton, system, set, motion, status, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -288,7 +339,7 @@ contains
    !> What is left at the motion: of forces over their sizes, of gaps and slips that are held over
    !> edges, of the law over the largest push.
    subroutine measure(self, newton, system, set, motion, status, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -325,7 +376,7 @@ contains
    !> What rows that are to hold are off by at worst, and by how much those are closed that are not,
    !> over edges and over what they are computed from.
    subroutine find_defect(self, set, motion, defect, rounded)
-      type(solve_t), intent(in) :: self
+      type(contact_newton_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion       !! evaluated
       real(wp), intent(out) :: defect, rounded
@@ -355,7 +406,7 @@ contains
    !> How far the forces that there are miss the laws with the gaps and slips that there are, over
    !> the largest of them, in the stiffness of the last condensation; 0 before there is one.
    subroutine find_missed(self, system, set, missed)
-      type(solve_t), intent(in) :: self
+      type(contact_newton_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(out) :: missed
@@ -365,7 +416,7 @@ contains
       integer :: k
 
       missed = 0.0_wp
-      if (.not. allocated(self%condensation%w)) return
+      if (.not. self%is_condensed) return
       call gather(set, set%lam, force)
       call gather(set, set%defect, defect)
       associate (n_slip => self%problem%n_slip, first => set%n_permanent)
@@ -378,7 +429,7 @@ contains
             at%tau(:n_slip) = force(1:, k)
             at%slip_target(:n_slip) = self%problem%slip_target(:, k)
             at%slip(:n_slip) = at%slip_target(:n_slip) - defect(1:, k)
-            missed = max(missed, coulomb_violation(at, self%mu(k)*set%item(first + k)%normal, &
+            missed = max(missed, coulomb_violation(at, self%law(k)%mu*set%item(first + k)%normal, &
                stiffness))
          end do
       end associate
@@ -420,7 +471,7 @@ contains
    !> The contacts in their multipliers alone, and those that obey the laws there. Where none do the
    !> curvature of the rows is left out: without it W is that of a body which is pushed.
    subroutine condense(self, newton, system, set, status, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -442,6 +493,8 @@ contains
             call phase_leave(system%phases, phase_eliminate)
             system%phases%n_factorisation = system%phases%n_factorisation + 1
             newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+            self%has_tangent = .not. (allocated(error) .or. self%condensation%is_singular)
+            self%is_condensed = self%has_tangent
          end if
          status = newton_singular
          if (allocated(error) .or. self%condensation%is_singular) return
@@ -456,7 +509,7 @@ contains
 
    !> The same by a factor that is kept. `is_found`: there is one, and it leads to forces.
    subroutine condense_by_kept(self, newton, system, set, motion, is_found, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
@@ -479,6 +532,7 @@ contains
             kept, set, newton%residual, .not. self%keeps_tangent, error)
       end associate
       is_found = is_found .and. .not. (allocated(error) .or. self%condensation%is_singular)
+      self%is_condensed = is_found
       if (is_found) then
          newton%convergence%n_iteration = newton%convergence%n_iteration + 1
          call find_hold(self, system, set)
@@ -490,7 +544,7 @@ contains
 
    !> Forces that obey the laws as the step is condensed; softer where there are none.
    subroutine solve_condensed(self, set, is_solved)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       logical, intent(out) :: is_solved
       type(contact_effort_t) :: effort
@@ -500,7 +554,7 @@ contains
          call lay_out(self, set)
          self%push = 0.0_wp
          if (level > 0) call soften(self, softer(level))
-         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true.)
+         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true., self%slope)
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)
@@ -509,17 +563,17 @@ contains
    !> Does the last tangent do for what is left? It does within the tolerance; and where slip has a
    !> direction, which needs a motion by each row, as long as it gains as much as there is to gain.
    pure logical function does_keep_tangent(self, newton) result(keeps)
-      type(solve_t), intent(in) :: self
+      type(contact_newton_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
 
-      keeps = newton%convergence%n_iteration > 0 .and. .not. self%condensation%is_singular
+      keeps = self%is_condensed .and. .not. self%condensation%is_singular
       if (keeps) keeps = self%size <= newton%convergence%tolerance &
          .or. (self%turns .and. self%size < enough_kept*self%last)
    end function does_keep_tangent
 
    !> Where contacts are all that holds a body they are held as the tangent is factorised.
    pure subroutine find_hold(self, system, set)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       integer :: k
@@ -538,7 +592,7 @@ contains
    !> The problem of the contacts as it was condensed. Without friction a contact has no slips to
    !> solve for: any one by itself.
    subroutine lay_out(self, set)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       integer :: k, i, m, place(set%n_row - set%n_permanent)
 
@@ -559,7 +613,7 @@ contains
          problem%free(1:, :) = problem%free(1:, :) - problem%slip_target
          do k = 1, size(self%status)
             associate (item => set%item(first + k), at => m*(k - 1) + 1)
-               problem%mu(k) = self%mu(k)*item%normal
+               problem%mu(k) = self%law(k)%mu*item%normal
                do i = 1, merge(0, m - 1, item%has_friction)
                   problem%w(at + i, at + i) = problem%w(at, at)
                   problem%free(i, k) = 0.0_wp
@@ -573,7 +627,7 @@ contains
    !> Each row gives way by this part of its own W about the forces of the iterate before: what has
    !> no solution as it is linearised comes nearer by it, and where forces stand it changes nothing.
    pure subroutine soften(self, part)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       real(wp), intent(in) :: part
       integer :: i, k, row
 
@@ -588,7 +642,7 @@ contains
 
    !> The correction of the unknowns, and the multipliers after it.
    subroutine correct(self, newton, system, set, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
@@ -615,7 +669,7 @@ contains
 
    !> Of parts of the correction take the first that gains, or that which leaves least.
    subroutine search(self, newton, system, set, motion, error)
-      type(solve_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -651,7 +705,7 @@ contains
 
    !> Go a part of the way to what the condensed step has as its solution.
    subroutine take(self, newton, system, set, motion, part)
-      type(solve_t), intent(in) :: self
+      type(contact_newton_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set

@@ -9,7 +9,7 @@ module emcon_contact_rounds
    use emcon_contact_candidates, only : candidates_are_many, &
       candidates_are_too_many, candidates_keep_forces, candidates_look, candidates_select
    use emcon_contact_conditions, only : gap_noise
-   use emcon_contact_newton, only : contact_newton_solve
+   use emcon_contact_newton, only : contact_newton_free, contact_newton_solve, contact_newton_t
    use emcon_contact_sets, only : contact_sets_begin_anew, contact_sets_hold, contact_sets_solve, &
       contact_sets_solve_by_laws
    use emcon_contact_support, only : contact_support_forget
@@ -178,7 +178,20 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      type(coulomb_t), allocatable :: law(:)     ! (contacts of the set)
+      type(contact_newton_t) :: solve
+
+      call solve_in_rounds(self, solve, system, newton, motion, status, error)
+      call contact_newton_free(solve)
+   end subroutine solve_with_all
+
+   subroutine solve_in_rounds(self, solve, system, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: solve     !! keeps its tangent from round to round
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
       logical :: leads
       integer :: i
 
@@ -190,25 +203,26 @@ contains
       do i = 1, most_rounds
          call candidates_select(self, system, motion)
          associate (set => self%set)
-            if (allocated(law)) deallocate(law)
-            allocate(law(set%n - set%n_permanent))
-            if (self%friction%is_on) law = self%friction%law(set%id(set%n_permanent + 1:set%n))
-            if (size(law) == 0 .and. self%rules%has_impacts) then
+            if (allocated(solve%law)) deallocate(solve%law)
+            allocate(solve%law(set%n - set%n_permanent))
+            if (self%friction%is_on) solve%law &
+               = self%friction%law(set%id(set%n_permanent + 1:set%n))
+            if (size(solve%law) == 0 .and. self%rules%has_impacts) then
                call newton_solve(newton, system, set, motion, status, error)
             else
-               call contact_newton_solve(newton, system, set, law, motion, status, error)
+               call contact_newton_solve(solve, newton, system, set, motion, status, error)
             end if
          end associate
          self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (allocated(error)) return
          if (status == newton_early) then
             newton%driven = 0.0_wp
-            call keep(self, law)
+            call keep(self, solve%law)
             call candidates_look(self, system, motion, status, .false.)
             if (status /= step_done) return
             cycle
          end if
-         call keep(self, law)
+         call keep(self, solve%law)
          if (status /= newton_converged) return
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          ! Before stencils are chosen anew: the step was solved with these.
@@ -223,7 +237,7 @@ contains
          if (.not. leads) return
       end do
       status = step_cycling
-   end subroutine solve_with_all
+   end subroutine solve_in_rounds
 
    !> Multipliers and ways of the candidates: what is not open acts.
    subroutine keep(self, law)

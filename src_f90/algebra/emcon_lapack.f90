@@ -10,6 +10,13 @@ module emcon_lapack
    private
    public :: dense_solve, dense_singular_values, dense_rank, dense_null_space
    public :: dense_eigen, dense_cholesky, dense_cholesky_solve
+   public :: dense_lu_t, dense_lu, dense_lu_solve
+
+   !> A = P L U of a square matrix.
+   type :: dense_lu_t
+      real(dp), allocatable, private :: lu(:, :)
+      integer, allocatable, private :: pivot(:)
+   end type dense_lu_t
 
    interface
       subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
@@ -18,6 +25,23 @@ module emcon_lapack
          real(dp), intent(inout) :: a(lda, *), b(ldb, *)
          integer, intent(out) :: ipiv(*), info
       end subroutine dgesv
+
+      subroutine dgetrf(m, n, a, lda, ipiv, info)
+         import :: dp
+         integer, intent(in) :: m, n, lda
+         real(dp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine dgetrf
+
+      subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: dp
+         character(len=1), intent(in) :: trans
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(dp), intent(in) :: a(lda, *)
+         integer, intent(in) :: ipiv(*)
+         real(dp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dgetrs
 
       subroutine dgesvd(jobu, jobvt, m, n, a, lda, s, u, ldu, vt, ldvt, work, lwork, info)
          import :: dp
@@ -80,6 +104,38 @@ contains
       x = 0.0_dp
       if (.not. is_singular) x = solution
    end subroutine dense_solve
+
+   !> Factorise A, to solve with it more than once.
+   subroutine dense_lu(a, factor, is_singular)
+      real(dp), intent(in) :: a(:, :)                !! (n, n)
+      type(dense_lu_t), intent(inout) :: factor
+      logical, intent(out) :: is_singular            !! a pivot is exactly zero: there is no factor
+      type(ieee_status_type) :: status
+      integer :: n, info
+
+      n = size(a, 1)
+      factor%lu = a
+      if (allocated(factor%pivot)) deallocate(factor%pivot)
+      allocate(factor%pivot(n))
+      info = 0
+      call blas_enter(status)
+      if (n > 0) call dgetrf(n, n, factor%lu, n, factor%pivot, info)
+      call blas_leave(status)
+      is_singular = info /= 0
+   end subroutine dense_lu
+
+   !> x = A^-1 x by the factor of `dense_lu`, which is not singular.
+   subroutine dense_lu_solve(factor, x)
+      type(dense_lu_t), intent(in) :: factor
+      real(dp), intent(inout), contiguous :: x(:)    !! (n)
+      type(ieee_status_type) :: status
+      integer :: info
+
+      call blas_enter(status)
+      if (size(x) > 0) call dgetrs("N", size(x), 1, factor%lu, size(x), factor%pivot, x, size(x), &
+         info)
+      call blas_leave(status)
+   end subroutine dense_lu_solve
 
    !> The singular values of A, descending.
    subroutine dense_singular_values(a, sigma, error)

@@ -9,6 +9,7 @@ module emcon_facet_frames_space
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_patch_sides_space, only : point_frames_t
+   use emcon_rotation, only : cross_product
    implicit none
    private
    public :: facet_frames_init, facet_weights_t, facet_weights_init, facet_corner_shares
@@ -181,7 +182,7 @@ contains
             share(:n, :))
       end associate
       associate (a => corner(:, 2) - corner(:, 1), b => corner(:, 3) - corner(:, 1))
-         normal = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
+         normal = cross_product(a, b)
       end associate
       area = 0.5_wp*sqrt(dot_product(normal, normal))
    end function triangle_area

@@ -6,6 +6,7 @@ module emcon_frame_vertex_space
    use emcon_dgrad9_first, only : affine_first => dg_affine, dg_first_t => dg_t, &
       difference_first => difference, difference_first_t => difference_t, height_first => dg_height
    use emcon_kinds, only : wp
+   use emcon_rotation, only : cross_product
    implicit none
    private
    public :: frame_vertex_t, frame_vertex, frame_place, frame_places, &
@@ -42,7 +43,7 @@ contains
       real(wp) :: normal(3)
 
       associate (a => x(:, 2) - x(:, 1), b => x(:, 3) - x(:, 1))
-         normal = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
+         normal = cross_product(a, b)
       end associate
       area = sqrt(dot_product(normal, normal))
    end function frame_size
@@ -86,7 +87,7 @@ contains
       ab = dot_product(a, b)
       bb = dot_product(b, b)
       square = aa*bb - ab*ab
-      normal = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
+      normal = cross_product(a, b)
       length = sqrt(dot_product(normal, normal))
       do j = 1, size(d, 2)
          da = dot_product(d(:, j), a)

@@ -268,6 +268,9 @@ contains
                end associate
             end associate
             call patch_stencil_choose(self%stencil(i), self%sides, self%frame(i), facet, x, u0)
+            associate (patch => self%stencil(i)%patch)
+               if (allocated(patch%slip_share)) deallocate(patch%slip_share)
+            end associate
             if (allocated(self%bulges)) self%sagitta(i) = sagitta_under(self, i, x, u0)
          end do
       end associate
@@ -359,6 +362,7 @@ contains
       integer :: k
 
       do k = 1, size(wanted)
+         if (item(k)%has_friction) call find_shares(self%stencil(wanted(k)), x, u0)
          call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset &
             + self%sagitta(wanted(k)), item(k))
       end do
@@ -403,6 +407,17 @@ contains
       end associate
    end subroutine evaluate_frame
 
+   !> Find the shares of slip of a stencil for its step, once.
+   pure subroutine find_shares(stencil, x, u0)
+      type(patch_stencil_t), intent(inout) :: stencil
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
+
+      if (allocated(stencil%patch%slip_share)) return
+      call patch_stencil_gather(stencil, x, u0, u0, at, way)
+      stencil%patch%slip_share = slip_shares(stencil, at)
+   end subroutine find_shares
+
    !> How much of the slip is over each triangle of a patch: what it covers of that as the step
    !> begins; where nothing is covered, all over the nearest one, which comes last.
    pure function slip_shares(stencil, at) result(share)
@@ -441,12 +456,12 @@ contains
 
    !> Slip with its derivatives.
    pure subroutine add_slip(stencil, row, at, way, item)
-      type(patch_stencil_t), intent(in) :: stencil
+      type(patch_stencil_t), intent(in) :: stencil   !! with its shares of slip
       integer, intent(in) :: row(:)              !! nodes of the stencil in the condition, but 1
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
-      real(wp) :: share(stencil%patch%n_triangle + 1), weight(size(row), 3)
+      real(wp) :: weight(size(row), 3)
       integer :: place(item%n_node), corner(3), k, s
 
       call condition_resize_slip(item)
@@ -457,9 +472,8 @@ contains
          item%t1(:, :n, :n_slip) = 0.0_wp
          if (.not. item%leaves_second) item%ht(:3*n, :3*n, :n_slip) = 0.0_wp
       end associate
-      share = slip_shares(stencil, at)
-      do k = 1, size(share)
-         if (.not. share(k) > 0.0_wp) cycle
+      do k = 1, size(stencil%patch%slip_share)
+         if (.not. stencil%patch%slip_share(k) > 0.0_wp) cycle
          corner = slip_corner(stencil, k)
          slip = slip_over(corner, at, way, item%leaves_second)
          ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
@@ -469,11 +483,13 @@ contains
             weight(:, 3) = -by(:, 1)
          end associate
          do s = 1, size(slip%f)
-            item%slip(s) = item%slip(s) + share(k)*slip%f(s)
-            call node_sums_first(slip%g(:, s), weight, share(k), place, item%t(:, :, s))
-            call node_sums_first(slip%c(:, s), weight, share(k), place, item%t1(:, :, s))
+            item%slip(s) = item%slip(s) + stencil%patch%slip_share(k)*slip%f(s)
+            call node_sums_first(slip%g(:, s), weight, stencil%patch%slip_share(k), place, &
+               item%t(:, :, s))
+            call node_sums_first(slip%c(:, s), weight, stencil%patch%slip_share(k), place, &
+               item%t1(:, :, s))
             if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, &
-               share(k), place, item%ht(:, :, s))
+               stencil%patch%slip_share(k), place, item%ht(:, :, s))
          end do
       end do
    end subroutine add_slip
@@ -492,7 +508,11 @@ contains
       slip = 0.0_wp
       if (self%stencil(i)%triangle == 0) return
       call patch_stencil_gather(self%stencil(i), x, u0, du, at, way)
-      share = slip_shares(self%stencil(i), at)
+      if (allocated(self%stencil(i)%patch%slip_share)) then
+         share = self%stencil(i)%patch%slip_share
+      else
+         share = slip_shares(self%stencil(i), at)
+      end if
       do k = 1, size(share)
          if (.not. share(k) > 0.0_wp) cycle
          over = slip_over(slip_corner(self%stencil(i), k), at, way, .true.)

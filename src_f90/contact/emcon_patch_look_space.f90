@@ -25,6 +25,9 @@ module emcon_patch_look_space
       type(patch_area_t) :: area
       logical :: is_integral = .false.           !! of heights over its area, not by it
       logical :: of_cover = .false.              !! of 1 in the place of heights: what is covered
+      !> (n_triangle + 1) of slip over each triangle, then over the nearest one: those of the start
+      !> of the step; not allocated: nobody has asked yet
+      real(wp), allocatable :: slip_share(:)
    end type patch_t
 
    !> What a patch sees at both ends of a step.

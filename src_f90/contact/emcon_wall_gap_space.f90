@@ -8,6 +8,7 @@ module emcon_wall_gap_space
       operator(+), operator(-), operator(*)
    use emcon_kinds, only : wp
    use emcon_profile_step_plane, only : profile_step, profile_step_t
+   use emcon_rotation, only : cross_product
    use emcon_wall, only : wall_drawn, wall_flat, wall_round, wall_t, wall_turned
    implicit none
    private
@@ -76,12 +77,12 @@ contains
       along = (1.0_wp/wall%arm)*dg_dot(arm, axis)
       square = (1.0_wp/wall%arm**2)*(dg_dot(arm, arm)*dg_dot(axis, axis)) - along*along
       ! The same without differences of large numbers.
-      off0 = cross(arm%v0, axis%v0)/wall%arm
-      off1 = cross(arm%v1, axis%v1)/wall%arm
+      off0 = cross_product(arm%v0, axis%v0)/wall%arm
+      off1 = cross_product(arm%v1, axis%v1)/wall%arm
       square%f0 = dot_product(off0, off0)
       square%f1 = dot_product(off1, off1)
-      square%df = dot_product(off0 + off1, (cross(arm%dv, axis%v0 + axis%v1) &
-         + cross(arm%v0 + arm%v1, axis%dv))/(2.0_wp*wall%arm))
+      square%df = dot_product(off0 + off1, (cross_product(arm%dv, axis%v0 + axis%v1) &
+         + cross_product(arm%v0 + arm%v1, axis%dv))/(2.0_wp*wall%arm))
       radius = sqrt([square%f0, square%f1])
       associate (total => max(sum(radius), no_distance*wall%extent))
          call profile_step(wall, [radius(0), along%f0], [square%df/total, along%df], step)
@@ -137,12 +138,5 @@ contains
             + (step%h(2, 1)*a%c(j) + step%h(2, 2)*b%c(j))*b%g
       end do
    end function of_two
-
-   pure function cross(a, b)
-      real(wp), intent(in) :: a(3), b(3)
-      real(wp) :: cross(3)
-
-      cross = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
-   end function cross
 
 end module emcon_wall_gap_space

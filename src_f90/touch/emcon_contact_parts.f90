@@ -8,6 +8,7 @@ module emcon_contact_parts
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_missed, contact_problem_t, nearly_met
    use emcon_contact_solution, only : contact_problem_solve
+   use emcon_contact_trials, only : contact_slope_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -16,12 +17,13 @@ module emcon_contact_parts
 contains
 
    !> Forces that obey the law at all contacts.
-   subroutine contact_parts_solve(self, push, effort, is_solved, near_enough)
+   subroutine contact_parts_solve(self, push, effort, is_solved, near_enough, slope)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) start, solution: y [M L/T^2]
       type(contact_effort_t), intent(out) :: effort  !! sum over parts
       logical, intent(out) :: is_solved              !! else `push` is as near as it came
       logical, intent(in) :: near_enough             !! as of `contact_problem_solve`
+      type(contact_slope_t), intent(inout), optional :: slope    !! as there
       type(contact_problem_t) :: own
       type(contact_effort_t) :: more
       integer :: part(size(self%mu)), p, i
@@ -32,7 +34,7 @@ contains
       part = 1
       if (self%n_slip > 1 .and. any(self%mu > 0.0_wp)) call find_parts(self, part)
       if (all(part == 1)) then
-         call contact_problem_solve(self, push, effort, is_solved, near_enough)
+         call contact_problem_solve(self, push, effort, is_solved, near_enough, slope)
          return
       end if
       is_solved = .true.

@@ -1,3 +1,4 @@
+! build: streams
 !> Places of contact whose gaps and slips are linear in their forces: the law at all of them.
 !>
 !> With y, by which all of them push, [g; -s] = free + W y and [lam; tau] = base + y - c ([g; -s] -
@@ -13,7 +14,7 @@ module emcon_contact_problem
    public :: contact_problem_t, contact_effort_t, contact_problem_create, contact_problem_force, &
       contact_problem_forces, contact_problem_motion, contact_problem_map, contact_problem_missed, &
       contact_problem_missed_by, contact_problem_status, contact_problem_stiffness, &
-      contact_problem_own_stiffness
+      contact_problem_own_stiffness, contact_problem_row_sizes
 
    !> The law is met where it is missed by less than this part of the largest force: by what a solve
    !> in double precision leaves of some hundred forces. Where no turn comes to that W is nearly
@@ -89,8 +90,30 @@ contains
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp) :: motion(0:self%n_slip, size(self%mu))
 
-      motion = self%free + reshape(matmul(self%w, reshape(push, [size(push)])), shape(push))
+      motion = 0.0_wp
+      call add_product(self%w, push, size(push), motion)
+      motion = self%free + motion
    end function contact_problem_motion
+
+   !> Add A x, column by column.
+   pure subroutine add_product(a, x, n, sum)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: a(n, n), x(n)
+      real(wp), intent(inout) :: sum(n)
+      integer :: j
+
+      do j = 1, n
+         sum = sum + a(:, j)*x(j)
+      end do
+   end subroutine add_product
+
+   !> What W may round: the sum of sizes of its rows [T^2/M].
+   pure function contact_problem_row_sizes(self) result(row_size)
+      type(contact_problem_t), intent(in) :: self
+      real(wp) :: row_size(0:self%n_slip, size(self%mu))
+
+      row_size = reshape(sum(abs(self%w), 2), shape(row_size))
+   end function contact_problem_row_sizes
 
    !> The stiffness by which a miss of the law at contact `i` is a force [M/T^2].
    pure real(wp) function contact_problem_stiffness(self, i) result(stiffness)
@@ -156,17 +179,24 @@ contains
 
    !> The same of a natural map that is known, as a force [M L/T^2]. What W rounds is no miss: where
    !> bodies move nearly freely large motions cancel.
-   pure real(wp) function contact_problem_missed_by(self, push, defect) result(missed)
+   pure real(wp) function contact_problem_missed_by(self, push, defect, row_size) result(missed)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp), intent(in) :: defect(0:, :)          !! (0:n_slip, n) [M L/T^2]
+      !> (0:n_slip, n) of `contact_problem_row_sizes`: as little as it can be, by the largest y
+      real(wp), intent(in), optional :: row_size(0:, :)
       real(wp) :: moved(0:self%n_slip, size(self%mu))
       integer :: i
 
       missed = 0.0_wp
       if (.not. maxval(abs(defect)) > 0.0_wp) return
-      moved = abs(self%free) + reshape(matmul(abs(self%w), reshape(abs(push), [size(push)])), &
-         shape(push))
+      moved = abs(self%free)
+      if (present(row_size)) then
+         moved = moved + maxval(abs(push))*row_size
+      else
+         moved = moved + reshape(matmul(abs(self%w), reshape(abs(push), [size(push)])), &
+            shape(push))
+      end if
       do i = 1, size(self%mu)
          missed = max(missed, maxval(abs(defect(:, i)) - rounded*moved(:, i) &
             *contact_problem_stiffness(self, i)))
@@ -174,40 +204,67 @@ contains
    end function contact_problem_missed_by
 
    !> Forces less those that the natural map makes of them.
-   pure subroutine contact_problem_map(self, push, defect, slope)
+   pure subroutine contact_problem_map(self, push, defect, slope, largest)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
       real(dp), intent(out), optional :: slope(:, :) !! of `defect` by y, proximal
+      real(wp), intent(out), optional :: largest     !! force [M L/T^2]
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
-      real(wp) :: mapped(0:most_slips), by(0:most_slips, 0:most_slips), stiffness, &
-         gain(0:self%n_slip, 0:self%n_slip)
-      integer :: i, k, m
+      real(wp) :: mapped(0:most_slips), by(0:most_slips, 0:most_slips, size(self%mu)), &
+         stiffness(size(self%mu))
+      integer :: i
 
-      m = 1 + self%n_slip
       motion = contact_problem_motion(self, push)
       force = contact_problem_forces(self, push, motion)
       do i = 1, size(self%mu)
-         stiffness = contact_problem_stiffness(self, i)
-         call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness, &
-            mapped, by)
+         stiffness(i) = contact_problem_stiffness(self, i)
+         call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness(i), &
+            mapped, by(:, :, i))
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
-         if (.not. present(slope)) cycle
+      end do
+      if (present(largest)) largest = maxval(abs(force))
+      if (present(slope)) call find_slope(self, stiffness, by(:self%n_slip, :self%n_slip, :), slope)
+   end subroutine contact_problem_map
+
+   !> What the natural map grows by with y, proximal.
+   pure subroutine find_slope(self, stiffness, by, slope)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: stiffness(:)           !! (n) of the map [M/T^2]
+      real(wp), intent(in) :: by(0:, 0:, :)          !! (row, by, n) its derivatives by the trial
+      real(dp), intent(out) :: slope(:, :)
+      real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu)), own(0:self%n_slip)
+      integer :: i, j, k, m
+
+      m = 1 + self%n_slip
+      do i = 1, size(self%mu)
+         do k = 0, self%n_slip
+            gain(:, k, i) = (stiffness(i) + self%hold(k, i))*by(:, k, i)
+            gain(k, k, i) = gain(k, k, i) - self%hold(k, i)
+         end do
+      end do
+      do j = 1, size(slope, 2)
+         do i = 1, size(self%mu)
+            associate (row => m*(i - 1) + 1)
+               own = gain(:, 0, i)*self%w(row, j)
+               do k = 1, self%n_slip
+                  own = own + gain(:, k, i)*self%w(row + k, j)
+               end do
+               slope(row:m*i, j) = real(own, dp)
+            end associate
+         end do
+      end do
+      do i = 1, size(self%mu)
          associate (row => m*(i - 1) + 1)
             do k = 0, self%n_slip
-               gain(:, k) = (stiffness + self%hold(k, i))*by(:self%n_slip, k)
-               gain(k, k) = gain(k, k) - self%hold(k, i)
-            end do
-            slope(row:m*i, :) = real(matmul(gain, self%w(row:m*i, :)), dp)
-            do k = 0, self%n_slip
-               slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:self%n_slip, k) &
-                  *(stiffness*merge(loosely, proximal, self%n_slip > 1 &
+               slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:, k, i) &
+                  *(stiffness(i)*merge(loosely, proximal, self%n_slip > 1 &
                   .or. self%hold(k, i) > 0.0_wp) &
                   *self%w(row + k, row + k) - 1.0_wp), dp)
                slope(row + k, row + k) = slope(row + k, row + k) + 1.0_dp
             end do
          end associate
       end do
-   end subroutine contact_problem_map
+   end subroutine find_slope
 
 end module emcon_contact_problem

@@ -10,7 +10,7 @@ module emcon_contact_solution
    use emcon_contact_problem, only : contact_effort_t, contact_problem_forces, &
       contact_problem_missed, contact_problem_motion, contact_problem_t, freely, nearly_met
    use emcon_contact_sweeps, only : contact_sweeps
-   use emcon_contact_trials, only : contact_nearing, contact_trials
+   use emcon_contact_trials, only : contact_nearing, contact_slope_t, contact_trials
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_lemke, only : lemke_solve
@@ -28,7 +28,7 @@ module emcon_contact_solution
 contains
 
    !> Forces that obey the law at all contacts.
-   subroutine contact_problem_solve(self, push, effort, is_solved, near_enough)
+   subroutine contact_problem_solve(self, push, effort, is_solved, near_enough, slope)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) start, solution: y [M L/T^2]
       type(contact_effort_t), intent(out) :: effort
@@ -36,6 +36,8 @@ contains
       !> The problem is one of several that come nearer to what is to be solved: where slip has a
       !> direction, forces that are nearer than those at the start will do
       logical, intent(in), optional :: near_enough
+      !> Of a problem before that is near this one, or of none yet
+      type(contact_slope_t), intent(inout), optional :: slope
       type(contact_problem_t) :: apart
       logical :: is_one_of_several
       integer :: turn, n_turn
@@ -47,7 +49,7 @@ contains
       associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp), &
             has_direction => self%n_slip > 1 .and. any(self%mu > 0.0_wp))
          call contact_trials(self, push, merge(few_trials, first_trials, has_pushes &
-            .or. has_direction), effort%n_trial, is_solved)
+            .or. has_direction), effort%n_trial, is_solved, slope)
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return

@@ -3,13 +3,14 @@
 !> From the forces so far, or near them, where places give way by a part of their own W.
 !> Source: docs/theory.md, eq. (14i).
 module emcon_contact_trials
-   use emcon_contact_problem, only : contact_effort_t, contact_problem_force, contact_problem_map, &
-      contact_problem_missed, contact_problem_missed_by, contact_problem_t, met
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_map, &
+      contact_problem_missed, contact_problem_missed_by, contact_problem_row_sizes, &
+      contact_problem_t, met
    use emcon_kinds, only : dp, wp
-   use emcon_lapack, only : dense_solve
+   use emcon_lapack, only : dense_lu, dense_lu_solve, dense_lu_t
    implicit none
    private
-   public :: contact_trials, contact_nearing
+   public :: contact_slope_t, contact_trials, contact_nearing
 
    !> Trials of a nearing.
    integer, parameter :: near_trials = 20
@@ -22,44 +23,73 @@ module emcon_contact_trials
    !> Where slip has a direction steps of which at most this part gains are so many in a row.
    integer, parameter :: most_stalls = 2
    real(wp), parameter :: no_part = 1.0e-3_wp
+   !> A step by what the map grew by at another trial is to leave no more than this part.
+   real(wp), parameter :: gain_again = 0.1_wp
+
+   !> What the map grows by at a trial, factorised.
+   type :: contact_slope_t
+      logical, private :: is_known = .false.
+      logical, allocatable, private :: pushes(:)     !! (rows) of a place that pushes or holds
+      integer, allocatable, private :: row(:)        !! numbers of these
+      real(dp), allocatable, private :: by_other(:, :)   !! (these, others)
+      type(dense_lu_t), private :: lu                !! of these
+   end type contact_slope_t
 
 contains
 
    !> By Newton's method for the natural map. `push` stays as it was if that does not end. Where
-   !> slip has a direction the second step in a row of which no part gains is the last one.
-   subroutine contact_trials(self, push, most, n_trial, is_solved)
+   !> slip has a direction the second step in a row of which no part gains is the last one, and what
+   !> the map grows by is taken from a step before as long as that gains enough.
+   subroutine contact_trials(self, push, most, n_trial, is_solved, slope)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
       integer, intent(inout) :: n_trial              !! counted on
-      logical, intent(out) :: is_solved           !! the law is met
+      logical, intent(out) :: is_solved              !! the law is met
+      !> Of a problem that is near this one, or of none; out: of this one
+      type(contact_slope_t), intent(inout), optional :: slope
+      type(contact_slope_t) :: own
+
+      if (present(slope)) then
+         call try(self, push, most, n_trial, is_solved, slope)
+      else
+         call try(self, push, most, n_trial, is_solved, own)
+      end if
+   end subroutine contact_trials
+
+   subroutine try(self, push, most, n_trial, is_solved, slope)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      integer, intent(in) :: most
+      integer, intent(inout) :: n_trial
+      logical, intent(out) :: is_solved
+      type(contact_slope_t), intent(inout) :: slope
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
-      real(dp) :: slope(size(push), size(push)), x(size(push))
-      real(wp) :: part, before, missed, largest
+      real(wp) :: part, before, largest, row_size(0:self%n_slip, size(self%mu))
       integer :: i, halving, n_stall
-      logical :: is_singular, was_solved
+      logical :: is_singular, was_solved, gains
 
       trial = push
       is_solved = .false.
       n_stall = 0
+      row_size = contact_problem_row_sizes(self)
+      call contact_problem_map(self, trial, defect, largest=largest)
       do i = 0, most
          was_solved = is_solved
-         call contact_problem_map(self, trial, defect, slope)
-         missed = contact_problem_missed_by(self, trial, defect)
-         largest = maxval(abs(contact_problem_force(self, trial)))
-         is_solved = missed <= met*largest
+         is_solved = is_met(self, trial, defect, row_size, largest)
          ! What is near is made exact: the first step to it leaves what W is stiffer by.
          if ((is_solved .and. (was_solved .or. .not. maxval(abs(defect)) > 0.0_wp)) &
             .or. i == most) exit
          n_trial = n_trial + 1
-         call find_step(slope, reshape(real(-defect, dp), [size(push)]), x, is_singular)
+         call step_again(self, slope, trial, defect, largest, gains)
+         if (gains) cycle
+         call find_step(self, trial, defect, slope, step, is_singular)
          if (is_singular) exit
-         step = reshape(real(x, wp), shape(step))
          before = norm2(defect)
          part = 1.0_wp
          do halving = 0, most_halvings
             new = trial + part*step
-            call contact_problem_map(self, new, defect)
+            call contact_problem_map(self, new, defect, largest=largest)
             if (norm2(defect) <= (1.0_wp - least_gain*part)*before) exit
             part = 0.5_wp*part
          end do
@@ -72,39 +102,91 @@ contains
          trial = new
       end do
       if (is_solved) push = trial
-   end subroutine contact_trials
+   end subroutine try
 
-   !> x of slope x = b. Rows of what neither pushes nor holds are those of the unit matrix: they are
-   !> left out of the elimination.
-   subroutine find_step(slope, b, x, is_singular)
-      real(dp), intent(in) :: slope(:, :)            !! (n, n)
-      real(dp), intent(in) :: b(:)                   !! (n)
-      real(dp), intent(out) :: x(:)                  !! (n)
-      logical, intent(out) :: is_singular            !! then x is nothing
-      logical :: pushes(size(b))
-      integer, allocatable :: row(:), other(:)
-      real(dp), allocatable :: rest(:, :), step(:, :)
+   !> Is the law met? Most trials are so far from it that no sum of W tells otherwise.
+   pure logical function is_met(self, trial, defect, row_size, largest)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: trial(0:, :), defect(0:, :)    !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: row_size(0:, :)        !! (0:n_slip, n) [T^2/M]
+      real(wp), intent(in) :: largest                !! force [M L/T^2]
+
+      is_met = contact_problem_missed_by(self, trial, defect, row_size) <= met*largest
+      if (is_met) is_met = contact_problem_missed_by(self, trial, defect) <= met*largest
+   end function is_met
+
+   !> A step by what the map grew by at another trial. It is taken only if it gains.
+   subroutine step_again(self, slope, trial, defect, largest, gains)
+      type(contact_problem_t), intent(in) :: self
+      type(contact_slope_t), intent(in) :: slope
+      real(wp), intent(inout) :: trial(0:, :)        !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(inout) :: defect(0:, :)       !! (0:n_slip, n) its map [M L/T^2]
+      real(wp), intent(inout) :: largest             !! force there [M L/T^2]
+      logical, intent(out) :: gains
+      real(wp) :: largest_new
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: new, left
+      real(dp) :: x(size(trial))
+
+      gains = .false.
+      if (self%n_slip < 2 .or. .not. slope%is_known .or. size(slope%pushes) /= size(trial)) return
+      call solve_step(slope, reshape(real(-defect, dp), [size(trial)]), x)
+      new = trial + reshape(real(x, wp), shape(trial))
+      call contact_problem_map(self, new, left, largest=largest_new)
+      gains = norm2(left) <= gain_again*norm2(defect)
+      if (.not. gains) return
+      trial = new
+      defect = left
+      largest = largest_new
+   end subroutine step_again
+
+   !> The step of Newton's method. Rows of what neither pushes nor holds are those of the unit
+   !> matrix: they are left out of the elimination.
+   subroutine find_step(self, trial, defect, slope, step, is_singular)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: trial(0:, :), defect(0:, :)    !! (0:n_slip, n) [M L/T^2]
+      type(contact_slope_t), intent(inout) :: slope
+      real(wp), intent(out) :: step(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      logical, intent(out) :: is_singular            !! then there is none
+      real(dp) :: full(size(trial), size(trial)), x(size(trial))
+      real(wp) :: again(0:self%n_slip, size(self%mu))
+      logical :: pushes(size(trial))
       integer :: j
 
+      call contact_problem_map(self, trial, again, full)
       pushes = .false.
-      do j = 1, size(b)
-         pushes(:j - 1) = pushes(:j - 1) .or. abs(slope(:j - 1, j)) > 0.0_dp
-         pushes(j + 1:) = pushes(j + 1:) .or. abs(slope(j + 1:, j)) > 0.0_dp
-         pushes(j) = pushes(j) .or. abs(slope(j, j) - 1.0_dp) > 0.0_dp
+      do j = 1, size(x)
+         pushes(:j - 1) = pushes(:j - 1) .or. abs(full(:j - 1, j)) > 0.0_dp
+         pushes(j + 1:) = pushes(j + 1:) .or. abs(full(j + 1:, j)) > 0.0_dp
+         pushes(j) = pushes(j) .or. abs(full(j, j) - 1.0_dp) > 0.0_dp
       end do
-      row = pack([(j, j = 1, size(b))], pushes)
-      other = pack([(j, j = 1, size(b))], .not. pushes)
-      x = b
-      is_singular = .false.
-      if (size(row) == 0) return
-      rest = reshape(b(row), [size(row), 1])
-      do j = 1, size(other)
-         rest(:, 1) = rest(:, 1) - slope(row, other(j))*b(other(j))
-      end do
-      allocate(step(size(row), 1))
-      call dense_solve(slope(row, row), rest, step, is_singular)
-      x(row) = step(:, 1)
+      slope%pushes = pushes
+      slope%row = pack([(j, j = 1, size(x))], pushes)
+      slope%by_other = full(slope%row, pack([(j, j = 1, size(x))], .not. pushes))
+      call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
+      slope%is_known = .not. is_singular
+      step = 0.0_wp
+      if (is_singular) return
+      call solve_step(slope, reshape(real(-defect, dp), [size(x)]), x)
+      step = reshape(real(x, wp), shape(step))
    end subroutine find_step
+
+   !> x of slope x = b.
+   subroutine solve_step(slope, b, x)
+      type(contact_slope_t), intent(in) :: slope
+      real(dp), intent(in) :: b(:)                   !! (n)
+      real(dp), intent(out) :: x(:)                  !! (n)
+      real(dp) :: rest(size(slope%row)), of_other(size(slope%by_other, 2))
+      integer :: j
+
+      x = b
+      of_other = pack(b, .not. slope%pushes)
+      rest = b(slope%row)
+      do j = 1, size(of_other)
+         rest = rest - slope%by_other(:, j)*of_other(j)
+      end do
+      call dense_lu_solve(slope%lu, rest)
+      x(slope%row) = rest
+   end subroutine solve_step
 
    !> By trials of places that give way by a part of their own W about the forces so far, over and
    !> over: forces that follow from others stay as near as can be to those before. The part grows

@@ -9,7 +9,7 @@ module test_contact_rounds
    use emcon_contact_candidates, only : candidates_keep_forces, candidates_select
    use emcon_contact_law, only : contact_laws_add
    use emcon_contact_law_registry, only : contact_law_of_method
-   use emcon_contact_newton, only : contact_newton_solve
+   use emcon_contact_newton, only : contact_newton_free, contact_newton_solve, contact_newton_t
    use emcon_convergence, only : round_off
    use emcon_correction, only : correction_free, correction_reset
    use emcon_coulomb_law, only : contact_open, contact_slides, contact_sticks, coulomb_t
@@ -218,7 +218,7 @@ contains
    subroutine solve_at_once(self, error)
       type(case_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
-      type(coulomb_t), allocatable :: law(:)
+      type(contact_newton_t) :: solve
       integer, allocatable :: id(:)
 
       associate (active => self%active, set => self%active%set)
@@ -227,20 +227,21 @@ contains
          active%candidates%takes_part(:size(self%system%acts)) = self%system%acts
          call candidates_select(active, self%system, self%motion)
          id = set%id(set%n_permanent + 1:set%n)
-         allocate(law(size(id)))
-         if (active%friction%is_on) law = active%friction%law(id)
+         allocate(solve%law(size(id)))
+         if (active%friction%is_on) solve%law = active%friction%law(id)
          ! What another solve has counted does not matter.
          self%newton%n_solve = 5
          self%newton%convergence%n_iteration = 5
          self%newton%convergence%n_history = 5
          self%newton%convergence%polishes = self%polishes
          self%newton%convergence%largest_move = self%largest_move
-         call contact_newton_solve(self%newton, self%system, set, law, self%motion, self%status, &
-            error)
+         call contact_newton_solve(solve, self%newton, self%system, set, self%motion, &
+            self%status, error)
+         call contact_newton_free(solve)
          if (allocated(error)) return
          call candidates_keep_forces(active)
-         active%is_active(id) = law%status%kind /= contact_open
-         if (active%friction%is_on) active%friction%law(id)%status = law%status
+         active%is_active(id) = solve%law%status%kind /= contact_open
+         if (active%friction%is_on) active%friction%law(id)%status = solve%law%status
          call active_set_select(active, self%system, self%motion)
          call constraints_evaluate(set, self%system, self%motion, .true.)
       end associate

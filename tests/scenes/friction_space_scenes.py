@@ -46,6 +46,7 @@ class Ball:
     mu: float = 0.3
     width: float = 0.6                           # half of what is meshed, across
     height: float = 0.9
+    kind: str = "C3D8"
 
     def contact_radius(self, push: float) -> float:
         """Hertz."""
@@ -54,6 +55,20 @@ class Ball:
     def torque(self, push: float) -> float:
         """That of full slip under Hertz's pressure."""
         return 3*np.pi/16*self.mu*push*self.contact_radius(push)
+
+    def slack(self, push: float) -> float:
+        """How far a force at the limit shifts the contact."""
+        shear = .5*self.stiffness/(1 + self.nu)
+        return 3*self.mu*push*(2 - self.nu)/(16*self.contact_radius(push)*shear)
+
+    def loop(self, use: float, push: float) -> float:
+        """What a force to and fro takes in a cycle: Mindlin and Deresiewicz, who have each way back as the way there, of
+        twice the force and shift."""
+        q = np.linspace(0, 1, 2001)
+        there = 2*self.slack(push)*(1 - (1 - q*use)**(2/3))
+        force = 2*use*self.mu*push*q
+        # Between the way there and the same one turned round.
+        return 2*np.trapezoid(force, there) - force[-1]*there[-1]
 
     def places(self, fine: float, end: float) -> np.ndarray:
         """Even ones up to `fine`, then ever wider ones."""
@@ -78,20 +93,35 @@ class Ball:
             low = self.radius - np.sqrt(self.radius**2 - x*x - y*y)
             return np.stack([x, y, low + (1 - low/self.height)*up[i[:, 2]]], 1)
 
-        return Block("C3D8", (len(across) - 1, len(across) - 1, len(up) - 1), place=place)
+        return Block(self.kind, (len(across) - 1, len(across) - 1, len(up) - 1), place=place)
 
     def deck(self, block: Block, turn: float, increments: int) -> str:
         """Pressed in one increment, turned in `increments`."""
+        return self.driven(block, [(1.0, ["6, 6", self.pressed()], ""), (1.0/increments, [f"6, 6, {turn!r}"], "")],
+                           held=(1, 2))
+
+    def pressed(self) -> str:
+        return f"3, 3, {self.contact_radius(1.0)**2/self.radius!r}"
+
+    def deck_to_and_fro(self, block: Block, way: float) -> str:
+        """Pressed without friction, then shifted along x, back, and again."""
+        change = "*CHANGE FRICTION, INTERACTION=I\n*FRICTION\n{}\n"
+        moves = [(1.0, ["1, 1", "6, 6", self.pressed()], change.format(1e-6*self.mu))]
+        moves += [(1.0, [f"1, 1, {x!r}"], change.format(self.mu)) for x in (way, -way, way)]
+        return self.driven(block, moves, held=(2, 2))
+
+    def driven(self, block: Block, moves: list[tuple[float, list[str], str]], held: tuple[int, int]) -> str:
+        """The plane is held along `held` and against tilting; steps by increments, what is driven, and cards each."""
         a = self.contact_radius(1.0)
         low = set(block.on(2, 0).tolist())
         near = [(e, f) for e, f in faces(block, 2, 0) if np.linalg.norm(
             block.x[[k - 1 for k in block.element[e - 1] if k in low], :2].mean(0)) < 1.6*a]
-        held = "".join(f"{k}, 1, 3\n" for k in block.on(2, 1))
+        top = "".join(f"{k}, 1, 3\n" for k in block.on(2, 1))
         text = bodies([block], [near], f"*ELASTIC\n{self.stiffness!r}, {self.nu!r}\n")
         text += walls.wall(walls.plane(), (0., 0., 0.)) + walls.pair(", SIDES=ONE", f"*FRICTION\n{self.mu!r}\n")
-        text += f"*BOUNDARY\n{held}{walls.REFERENCE}, 1, 2\n{walls.REFERENCE}, 4, 5\n"
-        for h, line in ((1.0, f"6, 6\n{walls.REFERENCE}, 3, 3, {a*a/self.radius!r}"),
-                        (1.0/increments, f"6, 6, {turn!r}")):
-            text += f"*STEP, NLGEOM, INC=1000\n*STATIC\n{h!r}, 1.\n*BOUNDARY\n{walls.REFERENCE}, {line}\n"
+        text += f"*BOUNDARY\n{top}{walls.REFERENCE}, {held[0]}, {held[1]}\n{walls.REFERENCE}, 4, 5\n"
+        for h, lines, cards in moves:
+            text += f"*STEP, NLGEOM, INC=1000\n*STATIC\n{h!r}, 1.\n*BOUNDARY\n"
+            text += "".join(f"{walls.REFERENCE}, {line}\n" for line in lines) + cards
             text += "*NODE FILE\nU\n*CONTACT FILE\nCF\n*END STEP\n"
         return text

@@ -380,6 +380,28 @@ def test_dominoes_fall_one_after_the_other(count: int, until: float, tmp_path: P
     assert (run.fields().x + run.fields()["displacement"][-1])[:8*count, 2].max() < (.8 if count == 3 else 1.0)
 
 
+@pytest.mark.parametrize(("rows", "until"), [
+    ((3, 2, 1), .6), pytest.param((10, 9), 2.0, marks=pytest.mark.long),
+    pytest.param((8, 7, 6, 5, 4), 2.4, marks=pytest.mark.long)])
+def test_a_pile_comes_to_rest(rows: tuple[int, ...], until: float, tmp_path: Path) -> None:
+    """Each row falls onto the gaps of the one below. Impacts leave a quarter of the energy of what goes along normals, over
+    and over in ever shorter times: after the last one that is further apart than an increment it dies out by increments."""
+    blocks: list[Block] = []
+    pairs: list[tuple[int, int]] = []
+    for r, n in enumerate(rows):
+        below = len(blocks) - rows[r - 1] + 1
+        for k in range(n):
+            corner = np.array([.42*(k - .5*(n - 1)) - .2, -.15, .02 + .32*r])
+            blocks.append(Block("C3D8", (1, 1, 1), size=(.4, .3, .3), place=lambda x, corner=corner: x + corner))
+            i = len(blocks)
+            pairs += [(i - 1, i)]*(k > 0) + ([(below + k, i), (below + k + 1, i)] if r > 0 else [])
+    history = on_each_other(tmp_path, blocks, pairs, .5, until).history
+    kinetic = history["kinetic"]
+    assert kinetic[-1] < 1e-12*kinetic.max()
+    # Nothing stirs it up any more.
+    assert kinetic[-5:].max() < 1e-10*kinetic.max()
+
+
 def test_what_slides_down_has_no_rest(tmp_path: Path) -> None:
     (tmp_path/"deck.inp").write_text(at_rest(.51, 1.0))
     run = run_deck(tmp_path/"deck.inp", tmp_path, 3)
@@ -449,6 +471,36 @@ def test_a_twisted_ball_nears_hertz(tmp_path: Path) -> None:
         assert run.verdict["law_violation"] < 1e-8
     assert abs(error[1]) < abs(error[0])
     assert abs(error[1]) < .03
+
+
+@pytest.mark.long
+def test_a_ball_sticks_in_the_middle(tmp_path: Path) -> None:
+    """Cattaneo and Mindlin: under a force Q along the plane what sticks has the radius a (1 - Q/(mu P))^(1/3), and a force to
+    and fro takes the energy of Mindlin and Deresiewicz; with two cells over a, then four.
+
+    Nearly incompressible, so that pushes shift nothing along the plane; small strains. What friction is below its limit adds
+    up to mu P - Q, spread as the pressure of Hertz is over a circle of that radius, whose mean square radius is 2/5 of it.
+    """
+    radius, loss = [], []
+    for cells in (2, 4):
+        ball = Ball(cells, stiffness=1e5, nu=.49, width=.13, height=.19, kind="C3D8H")
+        block = ball.block()
+        run = ran(tmp_path, ball.deck_to_and_fro(block, 1e-4))
+        fields, low, taken = run.fields(), np.array(block.on(2, 0)) - 1, run.history["friction_loss"]
+        assert taken[1] < 1e-5*taken[-1]
+        force = np.abs(fields["contact_force"][-1, low])
+        push = force[:, 2].sum()
+        use = force[:, 0].sum()/(ball.mu*push)
+        below = ball.mu*force[:, 2] - force[:, 0]
+        square = ((block.x[low] + fields["displacement"][-1, low])[:, :2]**2).sum(1)
+        radius.append(np.sqrt(2.5*(below*square).sum()/below.sum())/(ball.contact_radius(push)*(1 - use)**(1/3)) - 1)
+        loss.append((taken[-1] - taken[2])/ball.loop(use, push) - 1)
+        # The first way there is half of each that follows.
+        assert taken[3] - taken[2] == pytest.approx(2*taken[2], rel=1e-3)
+        assert run.verdict["law_violation"] < 1e-8
+    assert abs(radius[1]) < abs(radius[0])
+    assert abs(radius[1]) < .03
+    assert abs(loss[1]) < abs(loss[0])
 
 
 def thrown(card: str, v: tuple = (1., .2, 0)) -> str:

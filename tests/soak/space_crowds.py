@@ -6,14 +6,18 @@ Elastic and rigid bodies of all kinds of elements fly into each other, some of t
 held; each fifth scene is one of statics: bodies on each other that contact alone holds, with planes of symmetry. Options
 are those that nobody chose; with --mortar each pair of bodies has a contact of that kind, and walls one of nodes. Energy is
 that of the history, momentum and weight are summed here from positions and densities, overlap is that of `overlap.py`. With
---friction all scenes are of dynamics, and friction takes energy in each increment, and is within Coulomb's cone on planes.
+--friction all scenes are of dynamics, and Coulomb's law is looked for at each contact: friction takes energy there, is
+within the cone and at its limit where it slides, and its work is that of the forces over the positions of the nodes. On
+planes stick, slip and its direction are found from forces, positions and velocities of the nodes alone.
 The exit code is 1 where a run is called good and one of these says otherwise.
 """
 
 import pathlib
 import random
+import re
 import sys
 
+import h5py
 import numpy as np
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1]), str(pathlib.Path(__file__).resolve().parents[1]/"scenes")]
@@ -27,6 +31,8 @@ KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
 GRAVITY = 2.0
 #: Of the forces in statics, which Newton's method leaves.
 STATIC_BALANCE = 1.0e-7
+#: Of the largest force, by which Coulomb's law may be missed at a contact: what a solve leaves of its smallest ones.
+LAW = 1.0e-8
 
 
 def block(chance, is_ball, size):
@@ -128,7 +134,9 @@ def dynamics(seed, mortar, friction):
     text += f"*STEP, NLGEOM, INC=10000\n*DYNAMIC\n{chance.choice([0.01, 0.02, 0.04])}, 0.6\n"
     if floor and chance.random() < 0.5:
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
-    return text + "*NODE FILE\nU\n*END STEP\n"
+    if friction:
+        text += "*CONTACT PRINT\nCSTR, CF, CSHEAR, CSLIP, CNAREA\n*CONTACT FILE\nCF\n"
+    return text + f"*NODE FILE\nU{', V'*friction}\n*END STEP\n"
 
 
 def statics(seed, mortar):
@@ -237,7 +245,7 @@ def judge(run, deck):
     stored = history["kinetic"] + history["strain"] - history["external_work"] + history["friction_loss"]
     stored = stored + history["restitution_loss"]    # what would change the shape of rigid bodies that stop
     if "*FRICTION" in deck:
-        found += judge_friction(history, deck, (history["kinetic"] + history["strain"]).max())
+        found += judge_friction(run, deck, (history["kinetic"] + history["strain"]).max())
     if np.ptp(stored) > BALANCE*(history["kinetic"] + history["strain"]).max():
         found.append(f"energy {np.ptp(stored)/(history['kinetic'] + history['strain']).max():.1e}")
     if "*BOUNDARY" in deck:
@@ -252,19 +260,97 @@ def judge(run, deck):
     return found
 
 
-def judge_friction(history, deck, most):
-    """It takes energy, and on a plane the force of a pair, a sum of cones, is in the cone."""
-    found = []
+def judge_friction(run, deck, most):
+    """Coulomb's law, of all contacts and of each."""
+    history, found = run.history, []
     least = np.diff(history["friction_loss"]).min()
     if least < -BALANCE*most:
         found.append(f"friction gives {-least/most:.1e}")
-    if "TYPE=PLANE" in deck:
-        mu = float(deck.split("*FRICTION\n")[1].split()[0])
-        force = np.array([history[f"pair2_force_{a}"] for a in "xyz"])
-        over = np.hypot(force[0], force[1]) - mu*np.abs(force[2])
-        if over.max() > BALANCE*np.abs(force).max():
-            found.append(f"outside of Coulomb's cone by {over.max()/np.abs(force).max():.1e}")
+    mu = float(deck.split("*FRICTION\n")[1].split()[0])
+    record = Rubbing(run, deck)
+    found += judge_cones(record, mu) + judge_work(record, history, deck, most)
+    return found + (judge_plane(record, mu) if "TYPE=PLANE" in deck else [])
+
+
+class Rubbing:
+    """What a run says of each contact in each increment, and of the nodes."""
+
+    def __init__(self, run, deck):
+        with h5py.File(run.file(".h5"), "r") as file:
+            series = {name: values[1:] if values.ndim > 1 else values[:] for name, values in file["sets/CONTACT"].items()}
+        self.node, self.pair, self.force = series["CSTR_label"], series["CSTR_pair"], series["CF"]
+        self.pressure, self.shear = series["CSTR"][..., 0], series["CSHEAR"][..., :2]
+        self.slides = series["CSHEAR"][..., 2] == 2
+        self.area = series["CNAREA"]
+        slip = np.concatenate([0*series["CSLIP"][:1, :, :2], series["CSLIP"][..., :2]])
+        self.slip = np.diff(slip, axis=0)
+        #: Sums of parts are not what the last part has.
+        self.is_whole = run.history["cuts"][1:] == 0
+        self.h = run.history["h"][1:]
+        fields = run.fields()
+        self.u, self.v, self.field_force = fields["displacement"], fields["velocity"], fields["contact_force"]
+        #: Nodes of faces with nodes between: their pressures are means over faces, their forces of several contacts.
+        self.has_mean = np.zeros(len(fields.x) + 1, bool)
+        #: Nodes of rigid bodies, which jumps of velocities stop.
+        self.is_rigid = np.zeros(len(fields.x) + 1, bool)
+        rigid = {int(i) for i in re.findall(r"RIGID BODY, ELSET=B(\d+)", deck)}
+        for cell, number in zip(fields.cells, np.asarray(fields["body"])[0].ravel(), strict=False):
+            nodes = np.asarray(cell) + 1
+            self.has_mean[nodes] |= len(nodes) in (10, 20)
+            self.is_rigid[nodes] |= int(number) in rigid
+
+
+def judge_cones(record, mu):
+    """At each contact: surfaces push, friction is within the limit, and at it where it slides."""
+    plain = ~record.has_mean[record.node]
+    push, drag = record.pressure[:, plain], np.linalg.norm(record.shear[:, plain], axis=2)
+    slides = record.slides[:, plain] & ~record.is_rigid[record.node[plain]]
+    largest, found = max(np.abs(push).max(initial=0.0), 1e-300), []
+    for name, miss in (("a contact pulls", -push), ("friction over its limit", drag - mu*np.abs(push)),
+                       ("friction below its limit where it slides", (mu*push - drag)*slides)):
+        if miss.max(initial=0.0) > LAW*largest:
+            found.append(f"{name} by {miss.max()/largest:.1e} of the largest pressure")
     return found
+
+
+def judge_work(record, history, deck, most):
+    """Friction takes energy at each contact, where no velocities jump as it stops; with contact that does no work along its normal, as much as the forces of the
+    nodes do over their ways, where no velocities jump."""
+    work = np.einsum("tka,tka->tk", record.shear, record.slip)*record.area*~record.is_rigid[record.node]
+    found, least = [], work[record.is_whole].min(initial=0.0)
+    if least < -LAW*most:
+        found.append(f"friction gives {-least/most:.1e} at a contact")
+    if "*RIGID BODY, ELSET" not in deck:
+        by_nodes = -np.einsum("tka,tka->t", record.field_force[1:], np.diff(record.u, axis=0))
+        miss = np.abs(by_nodes - np.diff(history["friction_loss"]))[record.is_whole].max(initial=0.0)
+        if miss > BALANCE*most:
+            found.append(f"forces of contact take {miss/most:.1e} more than friction")
+    return found
+
+
+def judge_plane(record, mu):
+    """At each node on the plane z = 0 that is in contact by itself: over an increment the friction of a push n is the remainder of tau + c s over its
+    nearest point on the way from 0 to c a, cut to mu n, for any c; s is the slip, and a 0 or what it would stop after."""
+    on_plane = (record.pair == record.pair.max()) & ~(record.is_rigid | record.has_mean)[record.node]
+    node = record.node[on_plane] - 1
+    push, drag = record.force[:, on_plane, 2], -record.force[:, on_plane, :2]
+    slip = np.diff(record.u[:, node, :2], axis=0)
+    to_stop = 0.5*record.h[:, None, None]*record.v[:-1, node, :2]
+    largest = np.abs(record.force[:, on_plane]).max(initial=1e-300)
+    stiffness = largest/max(np.abs(slip[push > 0.0]).max(initial=0.0), 1e-300)
+    missed = np.minimum(*(law_missed(push, drag, stiffness*slip, stiffness*a, mu) for a in (0*to_stop, to_stop)))
+    missed = np.maximum(missed, -push)[record.is_whole].max(initial=0.0)
+    return [f"on the plane the law is missed by {missed/largest:.1e}"] if missed > LAW*largest else []
+
+
+def law_missed(push, drag, slip, target, mu):
+    """By how much, at each contact; slips are by a stiffness, as forces."""
+    trial = drag + slip
+    part = (trial*target).sum(-1)/np.maximum((target**2).sum(-1), 1e-300)
+    over = trial - np.clip(part, 0.0, 1.0)[..., None]*target
+    length = np.linalg.norm(over, axis=-1)
+    most = mu*np.maximum(push, 0.0)
+    return np.linalg.norm(drag - (np.minimum(1.0, most/np.maximum(length, 1e-300)))[..., None]*over, axis=-1)*(push > 0.0)
 
 
 def judge_rest(fields, deck):
