@@ -20,6 +20,7 @@ module emcon_contact_newton
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_may_provide, factor_policy_provide
    use emcon_friction, only : friction_stiffness
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_may_condense
@@ -49,11 +50,22 @@ module emcon_contact_newton
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
    !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
+   !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
+   !> solution for each row. And in statics they are stiff only where nothing else holds a
+   !> body: without that, pushes are found of rows that follow from others.
+   integer, parameter :: many = 100
    !> The tangent of an iterate does for the next one if that leaves less than this part; a factor
    !> that is kept does with new rows if less than that is left.
    real(wp), parameter :: enough_kept = 0.1_wp, enough_by_kept = 0.5_wp
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
+
+   !> What is left: relative residual, and what contacts miss.
+   type :: rest_t
+      real(wp) :: size = huge(1.0_wp)            !! of the iterate
+      real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)     !! of the best and the last one
+      integer :: n_stall = 0                     !! iterates since the last clear gain
+   end type rest_t
 
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
@@ -67,12 +79,10 @@ module emcon_contact_newton
       !> (n) in which way the law is to hold
       type(slip_status_t), allocatable, private :: status(:)
       real(wp), allocatable, private :: old(:), new(:)   !! (n_row) multipliers about a correction
-      !> Relative residual, and what contacts miss: of the iterate, the best and the last one
-      real(wp), private :: size = huge(1.0_wp), best = huge(1.0_wp), last = huge(1.0_wp)
+      type(rest_t), private :: rest
       logical, private :: is_rounding = .false.  !! nothing but round-off is left
-      integer, private :: n_stall = 0
       integer, private :: least_soft = 0         !! first of `softer` that is tried, 0: none
-      logical, private :: is_hung = .false.      !! contact alone holds a body
+      logical, private :: holds = .false.        !! rows are stiff in the tangent
       logical, private :: is_searching = .false. !! no tangent is wanted
       logical, private :: turns = .false.        !! something rubs, and slip has a direction
       logical, private :: is_driven = .false.    !! the next correction meets prescribed motion
@@ -98,7 +108,8 @@ contains
       integer :: k
 
       call begin(self, newton, set)
-      self%is_hung = newton%is_hung
+      self%holds = newton%is_hung .or. (evaluation_is_equilibrium(motion%evaluation) &
+         .and. set%n_row < many)
       call iterate(self, newton, system, set, motion, status, error)
       if (allocated(error)) return
       do k = 1, size(self%law)
@@ -141,10 +152,7 @@ contains
          allocate(self%push(0:n_slip, size(law)), source=0.0_wp)
          allocate(self%status(size(law)))
       end associate
-      self%size = huge(self%size)
-      self%best = self%size
-      self%last = self%size
-      self%n_stall = 0
+      self%rest = rest_t()
       self%least_soft = 0
       self%is_rounding = .false.
       self%is_condensed = self%has_tangent
@@ -193,15 +201,15 @@ contains
          call newton_check_interrupt(newton, status, error)
          if (allocated(error)) return
          ! The correction to come from here may be the last one, or by the tangent that there is.
-         self%is_searching = (i > 0 .and. (self%size <= no_search .or. self%turns)) .or. &
+         self%is_searching = (i > 0 .and. (self%rest%size <= no_search .or. self%turns)) .or. &
             (self%by_kept .and. newton%correction%kept%is_made)
          if (i == 0) self%is_searching = self%is_searching .or. self%has_tangent
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
-         if (i == most_iterates .and. self%size <= newton%convergence%tolerance) return
+         if (i == most_iterates .and. self%rest%size <= newton%convergence%tolerance) return
          status = newton_diverged
-         if (i == most_iterates .or. .not. self%size < huge(self%size)) return
+         if (i == most_iterates .or. .not. self%rest%size < huge(self%rest%size)) return
          call find_correction(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (.not. self%is_driven .and. goes_far(newton)) then
@@ -210,7 +218,7 @@ contains
             status = newton_early
             return
          end if
-         if (i > 0 .and. .not. self%is_driven .and. self%size > no_search) then
+         if (i > 0 .and. .not. self%is_driven .and. self%rest%size > no_search) then
             call search(self, newton, system, set, motion, error)
          else
             call take(self, newton, system, set, motion, 1.0_wp)
@@ -228,9 +236,10 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
 
-      may_keep = factor_policy_may_provide(newton%factor_policy) .and. .not. (self%is_hung .or. &
-         self%is_driven .or. self%has_tangent) .and. kept_factor_has_room( &
-         newton%correction%kept, set%n_row, size(system%matrix%column))
+      may_keep = set%n_row >= many .and. factor_policy_may_provide(newton%factor_policy) .and. &
+         .not. (self%holds .or. self%is_driven .or. self%has_tangent)
+      if (may_keep) may_keep = kept_factor_has_room(newton%correction%kept, set%n_row, &
+         size(system%matrix%column))
    end function may_keep
 
    !> The correction from here: by the last tangent, by a factor that is kept, or by a new tangent.
@@ -245,13 +254,14 @@ contains
       logical :: is_found
 
       self%keeps_tangent = does_keep_tangent(self, newton)
-      is_found = self%by_kept .and. (self%keeps_tangent .or. self%size < enough_by_kept*self%last)
+      is_found = self%by_kept .and. (self%keeps_tangent .or. &
+         self%rest%size < enough_by_kept*self%rest%last)
       if (is_found) call condense_by_kept(self, newton, system, set, motion, is_found, error)
       if (allocated(error)) return
       status = newton_converged
       if (.not. is_found) then
          if (self%by_kept) then
-            self%best = self%size
+            self%rest%best = self%rest%size
             self%by_kept = .false.
             self%keeps_tangent = .false.
          end if
@@ -294,20 +304,23 @@ contains
       type(contact_newton_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
 
-      is_done = self%size <= round_off
+      is_done = self%rest%size <= round_off
       if (is_done) return
-      is_done = self%is_rounding .or. self%size <= newton%convergence%tolerance
-      if (newton%convergence%polishes) is_done = is_done .and. self%size > polish_gain*self%last
+      ! What a factor that is kept leaves falls by a part each time: it goes to round-off.
+      is_done = self%is_rounding .or. (self%rest%size <= newton%convergence%tolerance &
+         .and. .not. self%by_kept)
+      if (newton%convergence%polishes) is_done = is_done .and. &
+         self%rest%size > polish_gain*self%rest%last
    end function is_done
 
    !> How long ago was the last clear gain?
    subroutine count_stall(self)
       type(contact_newton_t), intent(inout) :: self
 
-      self%n_stall = self%n_stall + 1
-      if (self%size < 0.5_wp*self%best) self%n_stall = 0
-      self%best = min(self%best, self%size)
-      self%last = self%size
+      self%rest%n_stall = self%rest%n_stall + 1
+      if (self%rest%size < 0.5_wp*self%rest%best) self%rest%n_stall = 0
+      self%rest%best = min(self%rest%best, self%rest%size)
+      self%rest%last = self%rest%size
    end subroutine count_stall
 
    !> Residual and rows at the motion; the last correction is halved as long as there are none.
@@ -329,10 +342,10 @@ contains
          call add_to_dofs(system%space%numbering, newton%dq, -1.0_wp, motion%du)
       end do
       if (allocated(error)) return
-      newton%convergence%last = self%size
+      newton%convergence%last = self%rest%size
       associate (convergence => newton%convergence)
          convergence%n_history = min(convergence%n_history + 1, size(convergence%history))
-         convergence%history(convergence%n_history) = self%size
+         convergence%history(convergence%n_history) = self%rest%size
       end associate
    end subroutine measure_damped
 
@@ -350,7 +363,7 @@ contains
       integer :: left
 
       status = newton_refused
-      self%size = huge(self%size)
+      self%rest%size = huge(self%rest%size)
       call motion_evaluate(motion)
       call system_respond(system, motion, .not. self%is_searching, .true.)
       if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
@@ -365,12 +378,12 @@ contains
       call newton_measure_forces(newton, system, set, motion)
       call find_defect(self, set, motion, defect, rounded)
       call find_missed(self, system, set, missed)
-      self%size = max(relative_size(newton%residual, newton%forces), defect, missed)
+      self%rest%size = max(relative_size(newton%residual, newton%forces), defect, missed)
       self%is_rounding = relative_size(newton%residual, newton%rounding) <= round_off &
          .and. rounded <= round_off .and. missed <= newton%convergence%tolerance
       call newton_find_idle(newton, system, self%is_rounding)
       if (.not. newton%is_idle) self%is_rounding = self%is_rounding .and. &
-         self%size <= most_rounding
+         self%rest%size <= most_rounding
    end subroutine measure
 
    !> What rows that are to hold are off by at worst, and by how much those are closed that are not,
@@ -481,7 +494,7 @@ contains
       integer :: left, turn
 
       do turn = 1, 2
-         has_curvature = .not. btest(self%n_stall/stall_turn, 0)
+         has_curvature = .not. btest(self%rest%n_stall/stall_turn, 0)
          call phase_enter(system%phases, phase_factorise, left)
          if (turn == 1 .and. self%keeps_tangent) then
             call condensation_renew(self%condensation, set, newton%residual, error)
@@ -501,7 +514,7 @@ contains
          call solve_condensed(self, set, is_solved)
          call phase_leave(system%phases, left)
          if (is_solved .or. .not. has_curvature) exit
-         self%n_stall = stall_turn
+         self%rest%n_stall = stall_turn
       end do
       status = merge(newton_converged, newton_diverged, is_solved)
       if (is_solved) self%status = contact_problem_status(self%problem, self%push)
@@ -567,11 +580,11 @@ contains
       type(newton_t), intent(in) :: newton
 
       keeps = self%is_condensed .and. .not. self%condensation%is_singular
-      if (keeps) keeps = self%size <= newton%convergence%tolerance &
-         .or. (self%turns .and. self%size < enough_kept*self%last)
+      if (keeps) keeps = (self%rest%size <= newton%convergence%tolerance .and. .not. self%by_kept) &
+         .or. ((self%turns .or. self%by_kept) .and. self%rest%size < enough_kept*self%rest%last)
    end function does_keep_tangent
 
-   !> Where contacts are all that holds a body they are held as the tangent is factorised.
+   !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
    pure subroutine find_hold(self, system, set)
       type(contact_newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -582,7 +595,7 @@ contains
          do k = 1, size(problem%stiffness)
             problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
          end do
-         if (.not. self%is_hung) return
+         if (.not. self%holds) return
          do k = first + 1, set%n_row
             self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
          end do
@@ -678,7 +691,7 @@ contains
       real(wp) :: before, part, best_part, least, start(size(motion%du, 1), size(motion%du, 2))
       integer :: i, status
 
-      before = self%size
+      before = self%rest%size
       self%is_searching = .true.
       start = motion%du
       least = huge(least)
@@ -689,11 +702,11 @@ contains
          call take(self, newton, system, set, motion, part)
          call measure(self, newton, system, set, motion, status, error)
          if (allocated(error)) return
-         if (self%size < least) then
-            least = self%size
+         if (self%rest%size < least) then
+            least = self%rest%size
             best_part = part
          end if
-         if (self%size < enough*before .or. i == most_parts) exit
+         if (self%rest%size < enough*before .or. i == most_parts) exit
          part = 0.5_wp*part
       end do
       if (abs(part - best_part) > 0.0_wp) then

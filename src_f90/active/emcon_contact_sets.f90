@@ -65,9 +65,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: goes_on, has_failed, is_early, is_driven, obeys
       logical, allocatable :: gripped(:)
-      integer :: i, n_redundant
+      integer :: i, n_left
 
-      n_redundant = 0
+      n_left = most_redundant
       is_driven = .true.
       has_failed = .false.
       call active_set_open_sets(self)
@@ -87,11 +87,11 @@ contains
          call candidates_solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
          ! Rows that lose their rank on the way are those of a motion that goes astray.
-         if (status == newton_redundant .and. (newton%convergence%n_iteration == 0 &
-            .or. candidates_are_many(self, newton%correction%kept))) then
+         if (status == newton_redundant .and. (newton%convergence%n_iteration == 0 .or. &
+            candidates_are_many(self, newton%correction%kept))) then
             call candidates_leave_out(self, newton%correction%redundant, goes_on)
-            n_redundant = n_redundant + 1
-            if (goes_on .and. n_redundant <= most_redundant) cycle
+            n_left = n_left - 1
+            if (goes_on .and. n_left >= 0) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
             has_failed = status == newton_diverged .and. .not. self%rules%has_impacts
@@ -104,8 +104,7 @@ contains
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          is_driven = .false.
          call candidates_keep_forces(self)
-         obeys = .not. is_early
-         if (obeys) obeys = obeys_laws(self, system)
+         obeys = merge(.false., obeys_laws(self, system), is_early)
          call candidates_look(self, system, motion, status, obeys)
          self%candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (self%candidates%have_changed .or. self%candidates%one_closes))

@@ -9,6 +9,7 @@ module emcon_layer_push
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
+   use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -23,8 +24,10 @@ module emcon_layer_push
    !> What is left on z of the largest force: the energy that it would give to what has no mass goes
    !> with its square, which is round-off.
    real(wp), parameter :: uncondensed = sqrt(epsilon(1.0_wp))
-   !> Rows that follow from others give way by this part of what they gain: forces have an end.
+   !> Rows that follow from others give way by this part of what they gain: forces have an end. What
+   !> that leaves of rates is taken back so often.
    real(dp), parameter :: dependent = 1.0e4_dp*epsilon(1.0_dp)
+   integer, parameter :: n_refine = 3
 
 contains
 
@@ -51,6 +54,8 @@ contains
          call constraints_force(opened, 1, self%push)
          allocate(y(system%space%numbering%n_unknown), mu(set%n_row))
          call respond_to(self, weight, y, mu, is_singular, error)
+         if (is_singular .and. .not. allocated(error)) call respond_condensed(self, weight, y, mu, &
+            is_singular, error)
          if (is_singular .or. allocated(error)) return
          call add_response(self, y, mu)
          field = 0.0_wp
@@ -80,8 +85,52 @@ contains
    end function have_gaps
 
    !> How z moves, and which multipliers of the set that takes: those of contacts that have closed
-   !> are `weight`, the others close no gap and open none. Of these some may follow from others.
+   !> are `weight`, the others close no gap and open none.
    subroutine respond_to(self, weight, y, mu, is_singular, error)
+      type(layer_t), intent(inout) :: self
+      real(wp), intent(in) :: weight(:)
+      !> (n_unknown) [L], (n_row) [M L/T^2]; undefined where they are not found
+      real(wp), intent(inout), contiguous :: y(:), mu(:)
+      logical, intent(out) :: is_singular
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: closed(:)
+      real(wp), allocatable :: ways(:, :), forces(:, :), residual(:)
+      real(dp), allocatable :: opening(:, :)     !! of the contacts that have closed
+      integer :: i, k, n
+
+      is_singular = .false.
+      associate (set => self%active%set, system => self%system, &
+            correction => self%newton%correction)
+         call constraints_evaluate(set, system, self%motion)
+         call constraints_rows(set, system%space%numbering)
+         call correction_lay_out(correction, system, set)
+         call correction_factorise(correction, system, set, is_singular, error)
+         if (allocated(error) .or. is_singular) return
+         closed = pack([(k, k = 1, set%n)], abs(weight(set%id(:set%n))) > 0.0_wp)
+         n = size(closed)
+         allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n_row, 0:n))
+         call pick_unknowns(system%space%numbering, self%push, residual)
+         residual = -residual
+         set%defect = 0.0_wp
+         call correction_solve(correction, set, residual, ways(:, 0), forces(:, 0), error)
+         residual = 0.0_wp
+         do i = 1, n
+            if (allocated(error)) return
+            set%defect = 0.0_wp
+            set%defect(closed(i)) = -1.0_wp
+            call correction_solve(correction, set, residual, ways(:, i), forces(:, i), error)
+         end do
+         if (allocated(error)) return
+         allocate(opening(n, 1))
+         call dense_solve(real(forces(closed, 1:), dp), real(reshape( &
+            weight(set%id(closed)) - forces(closed, 0), [n, 1]), dp), opening, is_singular)
+         y = ways(:, 0) + matmul(ways(:, 1:), real(opening(:, 1), wp))
+         mu = forces(:, 0) + matmul(forces(:, 1:), real(opening(:, 1), wp))
+      end associate
+   end subroutine respond_to
+
+   !> The same where rows of the set follow from others, or nearly: all are condensed.
+   subroutine respond_condensed(self, weight, y, mu, is_singular, error)
       type(layer_t), intent(inout) :: self
       real(wp), intent(in) :: weight(:)
       !> (n_unknown) [L], (n_row) [M L/T^2]; undefined where they are not found
@@ -108,7 +157,7 @@ contains
          end if
       end associate
       call condensation_free(condensation)
-   end subroutine respond_to
+   end subroutine respond_condensed
 
    !> Multipliers of the rows that have none so far, so that their values stay as they are.
    subroutine hold_others(condensation, mu, is_singular)
@@ -126,11 +175,14 @@ contains
       do k = 1, size(other)
          w(k, k) = (1.0_dp + dependent)*w(k, k)
       end do
-      rate = real(reshape(-condensation%free(other) - matmul(condensation%w(other, :), mu), &
-         [size(other), 1]), dp)
-      held = rate
-      call dense_solve(w, rate, held, is_singular)
-      mu(other) = real(held(:, 1), wp)
+      allocate(held(size(other), 1))
+      do k = 1, n_refine
+         rate = real(reshape(-condensation%free(other) - matmul(condensation%w(other, :), mu), &
+            [size(other), 1]), dp)
+         call dense_solve(w, rate, held, is_singular)
+         if (is_singular) return
+         mu(other) = mu(other) + real(held(:, 1), wp)
+      end do
    end subroutine hold_others
 
    !> Add what the forces on all freedoms change by where z moves by `y`, and the rows of the set

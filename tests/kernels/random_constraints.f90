@@ -13,7 +13,7 @@ module random_constraints
    use small_scenes, only : shake
    implicit none
    private
-   public :: problem_t, make_problem, make_chain, make_rows, full_gradient, tol_dp
+   public :: problem_t, make_problem, make_symmetric, make_chain, make_rows, full_gradient, tol_dp
 
    integer, parameter :: n_node = 30, n_constraint = 6
    !> Matrices are of kind `dp`; the problems have condition numbers of some 100.
@@ -162,5 +162,26 @@ contains
          a%value(slot(i)) = a%value(slot(i)) + real(n_each + 2, dp)
       end do
    end subroutine make_base
+
+   !> A problem whose matrix has a symmetric pattern: N and entries of zero.
+   subroutine make_symmetric(problem)
+      type(problem_t), intent(out) :: problem
+      type(csr_t) :: base
+      integer, allocatable :: slot(:), row(:)
+      integer :: i, k
+
+      call make_problem(problem)
+      base = problem%base
+      allocate(row(size(base%column)))
+      do i = 1, base%n_row
+         row(base%row_start(i) + 1:base%row_start(i + 1)) = i
+      end do
+      call csr_from_entries(problem%base, base%n_row, base%n_col, [row, base%column + 1], &
+         [base%column + 1, row], slot)
+      problem%base%value = 0.0_dp
+      do k = 1, size(row)
+         problem%base%value(slot(k)) = base%value(k)
+      end do
+   end subroutine make_symmetric
 
 end module random_constraints

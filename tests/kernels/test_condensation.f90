@@ -12,7 +12,7 @@ module test_condensation
    use emcon_solver_registry, only : solver_default
    use emcon_steps, only : method_null_space, method_saddle_point
    use emcon_system, only : system_t
-   use random_constraints, only : make_problem, make_rows, problem_t, tol_dp
+   use random_constraints, only : make_problem, make_rows, make_symmetric, problem_t, tol_dp
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -166,7 +166,7 @@ contains
       integer :: n, m, k, time
       logical :: is_singular
 
-      call make_problem(problem)
+      call make_symmetric(problem)
       call make_rows(problem)
       call kept_factor_set_up(kept, solver_default)
       call kept_factor_renew(kept, problem%base, error)

@@ -9,7 +9,7 @@ module test_kept_factor
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : find_solver_row, solver_default, solver_row, solver_row_t
-   use random_constraints, only : make_problem, problem_t, tol_dp
+   use random_constraints, only : make_problem, make_symmetric, problem_t, tol_dp
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -364,26 +364,5 @@ contains
       call kept_factor_renew(kept, problem%base, error)
       if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
    end subroutine prepare
-
-   !> A problem whose matrix has a symmetric pattern: N and entries of zero.
-   subroutine make_symmetric(problem)
-      type(problem_t), intent(out) :: problem
-      type(csr_t) :: base
-      integer, allocatable :: slot(:), row(:)
-      integer :: i, k
-
-      call make_problem(problem)
-      base = problem%base
-      allocate(row(size(base%column)))
-      do i = 1, base%n_row
-         row(base%row_start(i) + 1:base%row_start(i + 1)) = i
-      end do
-      call csr_from_entries(problem%base, base%n_row, base%n_col, [row, base%column + 1], &
-         [base%column + 1, row], slot)
-      problem%base%value = 0.0_dp
-      do k = 1, size(row)
-         problem%base%value(slot(k)) = base%value(k)
-      end do
-   end subroutine make_symmetric
 
 end module test_kept_factor

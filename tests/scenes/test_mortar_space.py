@@ -124,6 +124,30 @@ def test_sliding_over_facets(is_hill: bool, tmp_path: Path) -> None:
     assert run.fields()["displacement"][-1, 0, 0] > 0.35*4.0*1.2
 
 
+@pytest.mark.parametrize("options", ["", MORTAR])
+@pytest.mark.parametrize("cells", [pytest.param(4, id="4"), pytest.param(8, id="8", marks=pytest.mark.long)])
+def test_unlike_faces_land_flat(options: str, cells: int, tmp_path: Path) -> None:
+    """A block with some slide and spin lands on a larger plate of another mesh: all of its face touches at once, and most
+    conditions follow from others. No increment is cut, and no node needs its mass. No spring holds the plate: momenta
+    stand until the block has left."""
+    block = Block("C3D8", (cells, cells, 2), size=(1, 1, .5), place=lambda x: x - [.5, .5, -.0005])
+    plate = Block("C3D8", (cells + 1, cells + 1, 2), size=(1.5, 1.5, .5), place=lambda x: x - [.75, .75, .5])
+    text = bodies([block, plate], [faces(block, 2, 0), faces(plate, 2, 1)], "*ELASTIC\n1E4, .3\n*DENSITY\n1.\n")
+    text += pair(options) + velocities(block, np.array([.1, .05, -1]), np.array([0, 0, .2]))
+    run = ran(tmp_path, text + dynamic(.002, .04))
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    assert history["cuts"].sum() == 0
+    assert "take their mass back" not in run.log
+    assert history["active"].max() >= (cells + 1)**2
+    assert history["active"][-1] == 0
+    for name in ("px", "py", "pz", "lx", "ly", "lz"):
+        assert np.ptp(history[name]) < BALANCE
+    assert np.ptp(history["total"]) < BALANCE*history["total"][0]
+    x = run.fields().x + run.fields()["displacement"][-1]
+    assert x[:len(block.x), 2].min() > x[len(block.x):][np.array(plate.on(2, 1)) - 1, 2].max()
+
+
 def test_off_the_end(tmp_path: Path) -> None:
     """Vertices are let go as their faces leave the plate: nothing is lost, no step is cut."""
     run = ran(tmp_path, over_the_end(0.02, 0.9, MORTAR))
