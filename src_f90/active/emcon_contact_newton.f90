@@ -70,6 +70,8 @@ module emcon_contact_newton
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
       type(coulomb_t), allocatable :: law(:)     !! (n) of the contacts; mu = 0: no friction
+      !> Before a solve: contact alone holds a body; in it: rows are stiff in the tangent
+      logical :: holds = .false.
       type(condensation_t), private :: condensation
       type(contact_problem_t), private :: problem
       type(contact_slope_t), private :: slope    !! of the problem that was solved last
@@ -82,7 +84,6 @@ module emcon_contact_newton
       type(rest_t), private :: rest
       logical, private :: is_rounding = .false.  !! nothing but round-off is left
       integer, private :: least_soft = 0         !! first of `softer` that is tried, 0: none
-      logical, private :: holds = .false.        !! rows are stiff in the tangent
       logical, private :: is_searching = .false. !! no tangent is wanted
       logical, private :: turns = .false.        !! something rubs, and slip has a direction
       logical, private :: is_driven = .false.    !! the next correction meets prescribed motion
@@ -97,7 +98,8 @@ contains
    !> Solve for `motion%du`; on entry a first guess, with the multipliers of `set`, which has rows
    !> of all slips. Laws are left as they hold at the end.
    subroutine contact_newton_solve(self, newton, system, set, motion, status, error)
-      !> With laws; where it has solved the step with the same rows before it begins by that tangent
+      !> With laws, and `holds`; where it has solved the step with the same rows before it begins by
+      !> that tangent
       type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
@@ -108,7 +110,7 @@ contains
       integer :: k
 
       call begin(self, newton, set)
-      self%holds = newton%is_hung .or. (evaluation_is_equilibrium(motion%evaluation) &
+      self%holds = self%holds .or. (evaluation_is_equilibrium(motion%evaluation) &
          .and. set%n_row < many)
       call iterate(self, newton, system, set, motion, status, error)
       if (allocated(error)) return

@@ -197,12 +197,12 @@ contains
 
       self%friction%follows = .false.
       newton%looks_early = .false.
-      newton%is_hung = self%support%is_needed
       newton%convergence%largest_move = huge(1.0_wp)
       if (.not. self%rules%has_impacts) newton%convergence%largest_move = self%rules%largest_move
       do i = 1, most_rounds
          call candidates_select(self, system, motion)
          associate (set => self%set)
+            solve%holds = self%support%is_needed
             if (allocated(solve%law)) deallocate(solve%law)
             allocate(solve%law(set%n - set%n_permanent))
             if (self%friction%is_on) solve%law &

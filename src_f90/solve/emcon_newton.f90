@@ -82,7 +82,6 @@ module emcon_newton
       type(factor_policy_t) :: factor_policy     !! of a factor over steps
       logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
       logical :: is_idle = .false.               !! no load: all forces are round-off
-      logical :: is_hung = .false.               !! in it: does contact alone hold a body?
    end type newton_t
 
 contains
