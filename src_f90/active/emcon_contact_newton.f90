@@ -258,6 +258,7 @@ contains
       self%keeps_tangent = does_keep_tangent(self, newton)
       is_found = self%by_kept .and. (self%keeps_tangent .or. &
          self%rest%size < enough_by_kept*self%rest%last)
+      call count_stall(self)
       if (is_found) call condense_by_kept(self, newton, system, set, motion, is_found, error)
       if (allocated(error)) return
       status = newton_converged
@@ -273,7 +274,6 @@ contains
          call condense(self, newton, system, set, status, error)
          if (allocated(error) .or. status /= newton_converged) return
       end if
-      call count_stall(self)
       call correct(self, newton, system, set, error)
    end subroutine find_correction
 

@@ -128,7 +128,8 @@ contains
       real(dp) :: x(size(trial))
 
       gains = .false.
-      if (self%n_slip < 2 .or. .not. slope%is_known .or. size(slope%pushes) /= size(trial)) return
+      if (self%n_slip < 2 .or. .not. slope%is_known) return
+      if (size(slope%pushes) /= size(trial)) return
       call solve_step(slope, reshape(real(-defect, dp), [size(trial)]), x)
       new = trial + reshape(real(x, wp), shape(trial))
       call contact_problem_map(self, new, left, largest=largest_new)

@@ -255,8 +255,9 @@ contains
       type(space_t) :: space
       type(csr_t) :: matrix
       type(motion_t) :: motion
-      integer :: slot(0), i, k
+      integer :: slot(128), i, k                 ! two elements of eight unknowns
 
+      slot = 0
       do k = 1, size(expected, 2)
          call make_block(scene, "CPE4", [2, 1], block)
          scene%material = [scene%material, scene%material]
