@@ -17,7 +17,7 @@ module emcon_contact_candidates
       most_shift
    use emcon_gaps, only : gaps_follow_slips
    use emcon_kept_factor, only : kept_factor_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
    use emcon_newton, only : newton_solve, newton_t
@@ -38,12 +38,16 @@ contains
 
    !> Are there so many candidates that trials find the next set of them sooner than their problem?
    !> That is dense: it takes more operations than a factor does where they are more than its root.
+   !> What a factor takes is known while there is one: so a run that was resumed decides alike.
    pure logical function candidates_are_many(self, kept)
       type(active_set_t), intent(in) :: self
       type(kept_factor_t), intent(in) :: kept    !! of the step
+      integer :: most
 
-      candidates_are_many = are_beyond(self, max(most_condensed, &
-         int(min(kept%blocks%n_operation, real(most_together, wp)**3)**(1.0_wp/3.0_wp))))
+      most = most_condensed
+      if (kept%is_made) most = max(most, int(min(kept%blocks%n_operation, &
+         real(most_together, dp)**3)**(1.0_dp/3.0_dp)))
+      candidates_are_many = are_beyond(self, most)
    end function candidates_are_many
 
    !> Are there too many candidates for a problem of all of them?

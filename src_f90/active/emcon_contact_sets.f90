@@ -104,7 +104,7 @@ contains
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          is_driven = .false.
          call candidates_keep_forces(self)
-         obeys = merge(.false., obeys_laws(self, system), is_early)
+         obeys = obeys_laws(self, system) .and. .not. is_early
          call candidates_look(self, system, motion, status, obeys)
          self%candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (self%candidates%have_changed .or. self%candidates%one_closes))
