@@ -39,7 +39,8 @@ module emcon_mortar_space
    type, extends(mortar_means_t) :: mortar_space_t
       type(mortar_faces_t) :: faces
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
-      real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
+      !> By this reach, so far beside triangles, and what may close from so far off [L]
+      real(wp) :: chosen(3) = 0.0_wp
       type(mortar_rise_t), allocatable :: rise        !! of both sides; only if gaps follow arcs
       type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
       type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
@@ -169,20 +170,26 @@ contains
       type(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
       logical, intent(out) :: is_new             !! they may be others than before
-      integer :: f
 
       is_new = .false.
-      if (abs(self%chosen_reach - self%reach) <= 0.0_wp) then
+      if (is_chosen(self)) then
          if (position_memo_holds(self%memo, self%faces%near%node, x, u0)) return
       end if
       is_new = .true.
       call position_memo_take(self%memo, self%faces%near%node, x, u0)
-      self%chosen_reach = self%reach
-      do f = 1, self%faces%sides%slave%n_facet
-         call mortar_faces_choose(self%faces, f, x, u0, self%reach)
-      end do
+      self%chosen = [self%reach, self%faces%beside, self%faces%close]
+      call mortar_faces_choose(self%faces, x, u0, self%reach, self%acted)
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
    end subroutine choose_stencils
+
+   !> Are the stencils those of such a step?
+   pure logical function is_chosen(self)
+      type(mortar_space_t), intent(in) :: self
+
+      is_chosen = all(abs(self%chosen - [self%reach, self%faces%beside, self%faces%close]) <= 0.0_wp)
+      if (allocated(self%acted)) is_chosen = is_chosen .and. all(self%faces%may_close .or. &
+         .not. self%acted)
+   end function is_chosen
 
    !> What slips would be made of where forces act by this motion. It is taken over as a step begins
    !> and by `follow_slips`, so that what is solved does not depend on motions tried on the way.
@@ -302,6 +309,12 @@ contains
       real(wp) :: gap(0:1), area(0:1), least, ahead, size_of, way, deepest, weight(3)
       integer :: end, k
 
+      if (.not. self%faces%may_close(i)) then
+         self%state(i) = gap_state_t(size=self%state(i)%size)
+         self%cover(i) = 0.0_wp
+         self%scale(i) = least_cover*self%whole(i)
+         return
+      end if
       gap = 0.0_wp
       area = 0.0_wp
       ahead = huge(ahead)
@@ -332,7 +345,7 @@ contains
          self%cover(i) = max(area(1), 0.0_wp)
          state = gap_state_t(size=state%size, other_size=size_of, slip_shift=state%slip_shift)
          state%is_near = maxval(area) > 0.0_wp
-         state%is_covered = way <= self%chosen_reach - self%faces%beyond
+         state%is_covered = way <= self%chosen(2)
          state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = area(0) < least

@@ -23,6 +23,7 @@ module emcon_patch_contact_space
    use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t
    use emcon_patch_look_space, only : patch_look, patch_look_t, patch_shares
+   use emcon_patch_near_space, only : patch_scope_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_uses
@@ -247,7 +248,7 @@ contains
    pure subroutine patch_begin_step(self, x, u0, du)
       class(patch_contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      integer, allocatable :: facet(:)
+      type(patch_scope_t) :: scope
       integer :: i, k
 
       call near_list_update(self%near, x, u0, du, self%reach)
@@ -262,12 +263,12 @@ contains
          do i = 1, self%n_constraint
             associate (item => self%sides%frames%point(self%frame(i)))
                associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
-                  facet = pack(of, [(touch_rule_space_sees(self%sides%rule, self%class(i), of(k)) &
+                  scope%facet = pack(of, [(touch_rule_space_sees(self%sides%rule, self%class(i), of(k)) &
                      .and. near_list_within(self%near, item, of(k), self%reach), &
                      k = 1, size(of))])
                end associate
             end associate
-            call patch_stencil_choose(self%stencil(i), self%sides, self%frame(i), facet, x, u0)
+            call patch_stencil_choose(self%stencil(i), self%sides, self%frame(i), scope, x, u0)
             associate (patch => self%stencil(i)%patch)
                if (allocated(patch%slip_share)) deallocate(patch%slip_share)
             end associate

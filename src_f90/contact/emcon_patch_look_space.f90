@@ -21,7 +21,6 @@ module emcon_patch_look_space
       integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise
       real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
       real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
-      real(wp) :: unit = 1.0_wp                  !! length of these vectors, about [L]
       type(patch_area_t) :: area
       logical :: is_integral = .false.           !! of heights over its area, not by it
       logical :: of_cover = .false.              !! of 1 in the place of heights: what is covered
@@ -74,7 +73,7 @@ contains
       call place_vertices(patch, x + dx, place(:, :, 1))
       call find_means(patch, place(:, :, 0), look%height(0), look%cover(0))
       call find_means(patch, place(:, :, 1), look%height(1), look%cover(1))
-      look%way = longest_way(patch, place)
+      look%way = longest_way(patch, x, place)
       look%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
    end function patch_look
 
@@ -145,16 +144,29 @@ contains
             end do
          end associate
       end do
-      basis%way = longest_way(patch, place)
+      basis%way = longest_way(patch, x, place)
       basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
    end function patch_basis
 
    !> How far vertices go along a patch, at most [L].
-   pure real(wp) function longest_way(patch, place) result(way)
+   pure real(wp) function longest_way(patch, x, place) result(way)
       type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) at the start [L]
       real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+      real(wp) :: aa, ab, bb, dy(2), square
+      integer :: j
 
-      way = patch%unit*patch%length*sqrt(maxval(sum((place(:2, :, 1) - place(:2, :, 0))**2, 1)))
+      associate (a => x(:, 2) - x(:, 1), b => x(:, 3) - x(:, 1))
+         aa = dot_product(a, a)
+         ab = dot_product(a, b)
+         bb = dot_product(b, b)
+      end associate
+      square = 0.0_wp
+      do j = 1, size(place, 2)
+         dy = place(:2, j, 1) - place(:2, j, 0)
+         square = max(square, aa*dy(1)**2 + 2.0_wp*ab*dy(1)*dy(2) + bb*dy(2)**2)
+      end do
+      way = patch%length*sqrt(square)
    end function longest_way
 
    !> The integral of chi times height over the patch by its area, and what of it is covered.

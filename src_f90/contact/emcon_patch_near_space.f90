@@ -3,12 +3,13 @@
 module emcon_patch_near_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
-   use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place
+   use emcon_patch_sides_space, only : frame_normal, frame_sides, patch_sides_t, sides_place
    use emcon_rotation, only : cross_product
+   use emcon_sort, only : find_sorted
    use emcon_touch_rule_space, only : touch_rule_space_is_beyond, touch_rule_space_is_through
    implicit none
    private
-   public :: patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
+   public :: patch_scope_t, patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
       patch_near_goes_on
 
    !> A triangle faces a frame if the cosine of their normals is below this.
@@ -19,13 +20,25 @@ module emcon_patch_near_space
    real(wp), parameter :: as_near = 1.0e-6_wp
    !> What is behind a triangle by more than this, per facet, is in front of another one.
    real(wp), parameter, public :: room_behind = 0.2_wp
+   !> Beside triangles of slave facets a surface that ends fades over this part of a facet.
+   real(wp), parameter, public :: narrow_flange = 0.05_wp
+
+   !> Facets of the master that a patch may look at.
+   type :: patch_scope_t
+      integer, allocatable :: facet(:)           !! ascending
+      logical, allocatable :: is_far(:)          !! (as `facet`) they tell where lists end, and are
+                                                 !! not seen; not allocated: none of them
+      real(wp) :: beside = huge(1.0_wp)          !! a triangle of the slave sees what is beside it
+                                                 !! by no more [L]
+   end type patch_scope_t
 
    !> Triangles that are near, seen from the contact point.
    type :: patch_near_t
       integer :: n = 0
       integer :: point = 0                       !! of the slave, that looks
       real(wp) :: along(3) = 0.0_wp              !! normal of its frame, of which the list is
-      integer, allocatable :: triangle(:)        !! (n)
+      integer, allocatable :: triangle(:)        !! (n) ascending
+      integer, allocatable :: beyond(:, :)       !! (3, n) beyond each side, of these; 0: none
       real(wp), allocatable :: corner(:, :, :)   !! (3, 3, n) from the contact point [L]
       real(wp), allocatable :: normal(:, :)      !! (3, n) outwards, of length 1
       real(wp), allocatable :: distance(:)       !! (n) [L]
@@ -39,30 +52,31 @@ contains
 
    !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
    !> the other side of face nothing, nor do planes of symmetry that it rests along the axis of.
-   pure subroutine patch_near_find(near, sides, i, facet, x, u, is_beside)
+   pure subroutine patch_near_find(near, sides, i, scope, x, u)
       type(patch_near_t), intent(out) :: near
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: i                   !! 1 to the number of contact points
-      integer, intent(in) :: facet(:)            !! of the master
+      type(patch_scope_t), intent(in) :: scope
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      logical, intent(in), optional :: is_beside(:)          !! as `facet`; none of them
       type(nearest_t) :: nearest
       real(wp) :: origin(3), own(3)
       integer :: k, t
 
       near%point = i
       origin = point_origin(sides, i, x, u)
-      associate (start => sides%triangles%split%start)
-         near%triangle = [((t, t = start(facet(k)), start(facet(k) + 1) - 1), k = 1, size(facet))]
+      associate (start => sides%triangles%split%start, f => scope%facet)
+         near%triangle = [((t, t = start(f(k)), start(f(k) + 1) - 1), k = 1, size(f))]
       end associate
       near%n = size(near%triangle)
+      near%beyond = reshape([((find_sorted(near%triangle, sides%triangles%beyond(k, &
+         near%triangle(t))), k = 1, 3), t = 1, near%n)], [3, near%n])
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
       allocate(near%is_listed(near%n), near%is_apart(near%n), near%is_beside(near%n), &
          source=.false.)
-      if (present(is_beside)) then
-         associate (start => sides%triangles%split%start)
-            near%is_beside = [((is_beside(k), t = start(facet(k)), start(facet(k) + 1) - 1), &
-               k = 1, size(facet))]
+      if (allocated(scope%is_far)) then
+         associate (start => sides%triangles%split%start, f => scope%facet)
+            near%is_beside = [((scope%is_far(k), t = start(f(k)), start(f(k) + 1) - 1), &
+               k = 1, size(f))]
          end associate
       end if
       own = 0.0_wp
@@ -87,7 +101,35 @@ contains
             nearest = nearest_t()
          end associate
       end do
+      if (sides%frames%of_triangles) call find_beside(near, frame_sides(sides%frames, i, &
+         sides%frames%base(i), x, u), origin, scope%beside + narrow_flange &
+         *sides%triangles%size(near%triangle))
    end subroutine patch_near_find
+
+   !> Find what is beside a triangle of the slave, on the outside of one of its sides.
+   pure subroutine find_beside(near, side, origin, beside)
+      type(patch_near_t), intent(inout) :: near
+      real(wp), intent(in) :: side(3, 2)         !! of it, from its first corner [L]
+      real(wp), intent(in) :: origin(3)          !! its contact point, from there [L]
+      real(wp), intent(in) :: beside(:)          !! (n) by more [L]
+      real(wp) :: corner(3, 3), along(3), out(3)
+      integer :: k, t
+
+      corner(:, 1) = -origin
+      corner(:, 2:) = side - spread(origin, 2, 2)
+      associate (normal => cross_product(side(:, 1), side(:, 2)))
+         do k = 1, 3
+            along = corner(:, 1 + mod(k, 3)) - corner(:, k)
+            out = cross_product(along, normal)
+            out = out/max(sqrt(dot_product(out, out)), tiny(out))
+            do t = 1, near%n
+               if (near%is_beside(t)) cycle
+               near%is_beside(t) = all(matmul(out, near%corner(:, :, t)) &
+                  > dot_product(out, corner(:, k)) + beside(t))
+            end do
+         end do
+      end associate
+   end subroutine find_beside
 
    !> Contact point `i` of the slave, from its base.
    pure function point_origin(sides, i, x, u) result(origin)
@@ -116,12 +158,13 @@ contains
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame               !! 1 to the number of all frames
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp) :: best, least
+      real(wp) :: best, least, shortest
       integer :: g, t
 
       nearest = 0
       best = 0.0_wp
       least = huge(least)
+      shortest = minval(near%distance)
       associate (i => sides%frames%point(frame))
          associate (first => sides%frames%start(i), last => sides%frames%start(i + 1) - 1)
             associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal( &
@@ -154,7 +197,7 @@ contains
          real(wp), intent(in) :: room            !! [L]
 
          is_hidden = dot_product(near%corner(:, 1, t), near%normal(:, t)) > 0.0_wp .and. &
-            near%distance(t) > minval(near%distance) + room
+            near%distance(t) > shortest + room
       end function is_hidden
 
    end function patch_near_nearest
@@ -208,7 +251,7 @@ contains
       near%along = normal
       call find_layer(sides, near, nearest, normal)
       do
-         call spread_list(near, sides, nearest)
+         call spread_list(near, nearest)
          call find_parts(near, sides, part)
          if (maxval(part) <= 1) exit
          call find_fading(near, sides, part, x, u, fades)
@@ -219,29 +262,27 @@ contains
    end subroutine patch_near_list
 
    !> From the nearest triangle to those beyond its sides, and so on.
-   pure subroutine spread_list(near, sides, nearest)
+   pure subroutine spread_list(near, nearest)
       type(patch_near_t), intent(inout) :: near
-      type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: nearest
-      integer :: waiting(near%n), k, n, other
+      integer :: waiting(near%n), k, n, other, t
 
       near%is_listed = .false.
       near%is_listed(nearest) = .true.
       waiting(1) = nearest
       n = 1
       do while (n > 0)
-         associate (t => near%triangle(waiting(n)))
-            n = n - 1
-            do k = 1, 3
-               other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
-               if (other == 0) cycle
-               if (near%is_listed(other) .or. near%is_apart(other)) cycle
-               if (dot_product(near%normal(:, other), near%along) >= facing) cycle
-               near%is_listed(other) = .true.
-               n = n + 1
-               waiting(n) = other
-            end do
-         end associate
+         t = waiting(n)
+         n = n - 1
+         do k = 1, 3
+            other = near%beyond(k, t)
+            if (other == 0) cycle
+            if (near%is_listed(other) .or. near%is_apart(other)) cycle
+            if (dot_product(near%normal(:, other), near%along) >= facing) cycle
+            near%is_listed(other) = .true.
+            n = n + 1
+            waiting(n) = other
+         end do
       end do
    end subroutine spread_list
 
@@ -250,7 +291,7 @@ contains
       type(patch_near_t), intent(in) :: near
       type(patch_sides_t), intent(in) :: sides
       integer, intent(out) :: part(:)            !! (n)
-      integer :: waiting(near%n), first, k, n, n_part, other
+      integer :: waiting(near%n), first, k, n, n_part, other, t
 
       part = 0
       n_part = 0
@@ -261,18 +302,17 @@ contains
          waiting(1) = first
          n = 1
          do while (n > 0)
-            associate (t => near%triangle(waiting(n)))
-               n = n - 1
-               do k = 1, 3
-                  if (sides%triangles%is_ridge(k, t)) cycle
-                  other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
-                  if (other == 0) cycle
-                  if (.not. near%is_listed(other) .or. part(other) > 0) cycle
-                  part(other) = n_part
-                  n = n + 1
-                  waiting(n) = other
-               end do
-            end associate
+            t = waiting(n)
+            n = n - 1
+            do k = 1, 3
+               if (sides%triangles%is_ridge(k, near%triangle(t))) cycle
+               other = near%beyond(k, t)
+               if (other == 0) cycle
+               if (.not. near%is_listed(other) .or. part(other) > 0) cycle
+               part(other) = n_part
+               n = n + 1
+               waiting(n) = other
+            end do
          end do
       end do
    end subroutine find_parts
@@ -330,7 +370,10 @@ contains
 
       goes_on = other > 0
       if (goes_on) goes_on = faces(near, sides, other, x, u)
-      if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
+      if (.not. goes_on) return
+      associate (k => find_sorted(near%triangle, other))
+         if (k > 0) goes_on = .not. near%is_apart(k)
+      end associate
    end function patch_near_goes_on
 
    !> Does a triangle face the frame?

@@ -18,7 +18,7 @@ module emcon_patch_sides_space
    private
    public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, &
       patch_sides_t, sides_point, sides_place, sides_in_plane, sides_holds, &
-      frame_normal, flip_signs
+      frame_normal, frame_sides, flip_signs
 
    !> A ring of no direction: its fourth moment is less than this part of that of distances.
    real(wp), parameter :: round = 1.0e-6_wp
@@ -394,7 +394,21 @@ contains
       integer, intent(in) :: k                   !! 1 to n
       integer, intent(in) :: node                !! of the scene, its base
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
-      real(wp) :: normal(3), side(3, 2), way(3)
+      real(wp) :: normal(3), side(3, 2)
+
+      side = frame_sides(self, k, node, x, u)
+      normal = cross_product(side(:, 1), side(:, 2))
+      normal = normal/max(sqrt(dot_product(normal, normal)), tiny(normal))
+   end function frame_normal
+
+   !> The vectors of frame `k` at x + u.
+   pure function frame_sides(self, k, node, x, u) result(side)
+      type(point_frames_t), intent(in) :: self
+      integer, intent(in) :: k                   !! 1 to n
+      integer, intent(in) :: node                !! of the scene, its base
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
+      real(wp) :: side(3, 2)                     !! a and b [L]
+      real(wp) :: way(3)
       integer :: i
 
       side = 0.0_wp
@@ -404,9 +418,7 @@ contains
          side(:, 1) = side(:, 1) + self%weight(1, i)*way
          side(:, 2) = side(:, 2) + self%weight(2, i)*way
       end do
-      normal = cross_product(side(:, 1), side(:, 2))
-      normal = normal/max(sqrt(dot_product(normal, normal)), tiny(normal))
-   end function frame_normal
+   end function frame_sides
 
    !> The triangles of a surface.
    pure subroutine patch_triangles_init(self, facets, x)

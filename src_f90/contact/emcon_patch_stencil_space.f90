@@ -9,8 +9,8 @@ module emcon_patch_stencil_space
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_look_space, only : patch_t
    use emcon_patch_moments_space, only : patch_triangle
-   use emcon_patch_near_space, only : patch_near_find, patch_near_goes_on, patch_near_list, &
-      patch_near_nearest, patch_near_t, room_behind
+   use emcon_patch_near_space, only : narrow_flange, patch_near_find, patch_near_goes_on, &
+      patch_near_list, patch_near_nearest, patch_near_t, patch_scope_t, room_behind
    use emcon_patch_sides_space, only : flip_signs, frame_normal, patch_sides_t, sides_holds, &
       sides_in_plane, sides_place, sides_point
    use emcon_rotation, only : cross_product
@@ -25,8 +25,6 @@ module emcon_patch_stencil_space
    !> slave are smaller, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp
    integer, parameter :: most_strips = 2
-   !> Beside triangles of slave facets it fades at once, over this part of a facet.
-   real(wp), parameter :: narrow_flange = 0.05_wp
    !> A node is behind a triangle by no more than so many of its distances, and `room_behind`.
    real(wp), parameter :: distances = 2.0_wp
 
@@ -59,25 +57,23 @@ module emcon_patch_stencil_space
 
 contains
 
-   !> Choose the stencil of frame `frame` of the slave at x + u, where the facets `facet` of the
-   !> master are near its node: the nearest triangle that faces this frame more than any other of
-   !> the node, and what hangs together with that and faces the frame too.
-   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u, is_beside)
+   !> Choose the stencil of frame `frame` of the slave at x + u, where the facets of `scope` are near
+   !> its node: the nearest triangle that faces this frame more than any other of the node, and what
+   !> hangs together with that and faces the frame too.
+   pure subroutine patch_stencil_choose(self, sides, frame, scope, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame               !! 1 to the number of all frames
-      integer, intent(in) :: facet(:)            !! ascending
+      type(patch_scope_t), intent(in) :: scope
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      !> (as `facet`) the patch cannot see it in the step; none of them
-      logical, intent(in), optional :: is_beside(:)
       type(patch_near_t) :: near
       real(wp) :: normal(3)
       integer :: i, nearest
 
       self%triangle = 0
-      if (size(facet) == 0) return
+      if (size(scope%facet) == 0) return
       i = sides%frames%point(frame)
-      call patch_near_find(near, sides, i, facet, x, u, is_beside)
+      call patch_near_find(near, sides, i, scope, x, u)
       nearest = patch_near_nearest(near, sides, frame, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
@@ -93,7 +89,6 @@ contains
       self%strip = flange*self%patch%length/(patch_size*self%size)
       if (sides%frames%of_triangles) then
          self%patch%length = 1.0_wp
-         self%patch%unit = sides%frames%size(i)
          self%patch%area = patch_triangle()
          self%patch%is_integral = .true.
          self%n_strip = 1
@@ -119,7 +114,7 @@ contains
       do t = 1, near%n
          if (.not. near%is_listed(t)) cycle
          do k = 1, 3
-            ends(k, t) = .not. goes_on(sides%triangles%beyond(k, near%triangle(t)))
+            ends(k, t) = .not. goes_on(k, t)
             if (.not. ends(k, t)) cycle
             associate (planes => planes_of_side(sides, near%point, near%triangle(t), k, x))
                ends(k, t) = planes == 0
@@ -143,15 +138,18 @@ contains
 
    contains
 
-      !> Is a triangle listed, or would it be if it were nearer? A triangle of the slave sees what
-      !> is beside the list.
-      pure logical function goes_on(other)
-         integer, intent(in) :: other            !! 0: none
+      !> Is what is beyond a side listed, or would it be if it were nearer? A triangle of the slave
+      !> sees what is beside the list.
+      pure logical function goes_on(k, t)
+         integer, intent(in) :: k, t             !! side of a triangle of the list
 
-         if (sides%frames%of_triangles) then
-            goes_on = other > 0 .and. any(near%triangle == other .and. near%is_listed)
+         if (.not. sides%frames%of_triangles) then
+            goes_on = patch_near_goes_on(near, sides, sides%triangles%beyond(k, &
+               near%triangle(t)), x, u)
+         else if (near%beyond(k, t) == 0) then
+            goes_on = .false.
          else
-            goes_on = patch_near_goes_on(near, sides, other, x, u)
+            goes_on = near%is_listed(near%beyond(k, t))
          end if
       end function goes_on
 

@@ -31,6 +31,7 @@ module emcon_near_list
       real(wp) :: nearest = 0.0_wp               !! of it: distance along the axes, or `reach` [L]
       real(wp) :: depth = 0.0_wp                 !! beyond the fractions above [L]
       real(wp) :: facet_size = 0.0_wp             !! width plus height in the mean, at first [L]
+      real(wp) :: motion = 0.0_wp                !! the largest of a node in the step, so far [L]
       !> How far apart the surfaces are where nothing is near, beyond `depth`; else 0 [L].
       real(wp) :: clearance = 0.0_wp
    end type near_list_t
@@ -73,6 +74,7 @@ contains
       moved = sqrt(moved)
       step_motion = sqrt(step_motion)
       call place(self, x, u0)
+      self%motion = max(step_motion, merge(self%motion, 0.0_wp, within > 0.0_wp))
       within = max(within, &
          max(near_per_facet*self%facet_size, near_per_motion*step_motion) + self%depth)
       if (.not. 2.0_wp*moved + (within - self%depth) < surely*(self%reach - self%depth)) then
