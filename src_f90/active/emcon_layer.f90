@@ -444,7 +444,7 @@ contains
          end associate
       end do
       call constraints_select(set, pack([(k, k = 1, size(stays))], stays .and. is_near))
-      call constraints_evaluate(set, self%system, self%motion)
+      call constraints_evaluate(set, self%system, self%motion, .true.)
       do k = 1, set%n
          associate (item => set%item(k))
             stays(set%id(k)) = .not. any(self%is_massless(item%node(:item%n_node)))

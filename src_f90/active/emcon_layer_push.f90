@@ -50,7 +50,7 @@ contains
          call constraints_select(opened, pack(id, have_gaps(system, id)))
          self%push = 0.0_wp
          opened%lam = weight(opened%id)
-         call constraints_evaluate(opened, system, self%motion)
+         call constraints_evaluate(opened, system, self%motion, .true.)
          call constraints_force(opened, 1, self%push)
          allocate(y(system%space%numbering%n_unknown), mu(set%n_row))
          call respond_to(self, weight, y, mu, is_singular, error)

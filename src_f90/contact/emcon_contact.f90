@@ -74,8 +74,8 @@ module emcon_contact
       !> of would be seen only with a motion that goes through the surface [L].
       real(wp) :: max_gap_on_entry = huge(1.0_wp)
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
-      !> (n_constraint) it acted as the step began, and is measured however far it is; not allocated:
-      !> none of them
+      !> (n_constraint) it acted as the step began, and is measured however far it is; not
+      !> allocated: none of them
       logical, allocatable :: acted(:)
       !> (n_constraint) the other slave node at the same place of a surface of tied pieces; 0: none
       integer, allocatable :: duplicate(:)

@@ -3,14 +3,16 @@
 module emcon_mortar_faces_space
    use emcon_errors, only : error_t
    use emcon_facet_frames_space, only : facet_frames_init
-   use emcon_facets, only : facets_init
+   use emcon_element_kind, only : max_face_nodes
+   use emcon_facets, only : facets_init, facets_length
    use emcon_interactions, only : contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
    use emcon_mortar_itself_space, only : mortar_itself_facet, mortar_itself_init, &
       mortar_itself_meets, mortar_itself_t
    use emcon_mortar_slave_space, only : mortar_slave_init, mortar_slave_t
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_patch_near_space, only : patch_scope_t
+   use emcon_patch_near_space, only : narrow_flange, patch_outline, patch_outline_misses, &
+      patch_outline_t, patch_scope_t
    use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_t
    use emcon_scene, only : scene_t
@@ -82,7 +84,8 @@ contains
       call near_list_update(self%near, x, u0, du, reach)
       associate (near => self%near)
          self%beside = max(beside_per_facet*near%facet_size, beside_per_motion*near%motion)
-         self%close = near%depth + max(close_per_facet*near%facet_size, close_per_motion*near%motion)
+         self%close = near%depth + max(close_per_facet*near%facet_size, &
+            close_per_motion*near%motion)
       end associate
       if (self%sides%rule%is_self .and. self%n_sifted /= self%near%n_list) call sift(self)
    end subroutine mortar_faces_look
@@ -174,14 +177,41 @@ contains
             seen = pack(of, [(near_list_within(self%near, f, of(k), reach), k = 1, size(of))])
          end associate
       end associate
-      if (size(seen) == 0) return
-      scope%facet = with_neighbours(self, f, seen)
-      scope%is_far = [(find_sorted(seen, scope%facet(k)) == 0, k = 1, size(scope%facet))]
       scope%beside = self%beside
       do t = self%split%start(f), self%split%start(f + 1) - 1
+         scope%facet = with_neighbours(self, f, ahead_of(self, t, seen, x, u0))
+         scope%is_far = [(find_sorted(seen, scope%facet(k)) == 0, k = 1, size(scope%facet))]
          call patch_stencil_choose(self%stencil(t), self%sides, t, scope, x, u0)
       end do
    end subroutine choose_facet
+
+   !> Facets of the master that are not beside triangle `t` of the slave.
+   pure function ahead_of(self, t, facet, x, u0) result(ahead)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: t                   !! 1..n_triangle
+      integer, intent(in) :: facet(:)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      integer, allocatable :: ahead(:)
+      type(patch_outline_t) :: outline
+      real(wp) :: corner(3, max_face_nodes)
+      logical :: is_ahead(size(facet))
+      integer :: i, k, n
+
+      outline = patch_outline(self%sides, t, x, u0)
+      associate (master => self%sides%master, base => self%sides%frames%base(t))
+         do k = 1, size(facet)
+            n = count(master%facet(:, facet(k)) > 0)
+            do i = 1, n
+               associate (node => master%facet(i, facet(k)))
+                  corner(:, i) = (x(:, node) - x(:, base)) + (u0(:, node) - u0(:, base))
+               end associate
+            end do
+            is_ahead(k) = .not. patch_outline_misses(outline, corner(:, :n), self%beside &
+               + narrow_flange*facets_length(master, facet(k)))
+         end do
+      end associate
+      ahead = pack(facet, is_ahead)
+   end function ahead_of
 
    !> Facets of the master, and all that share a node with them and that slave facet `f` may meet:
    !> the field over the former ends where the surface does, not where the list does.

@@ -307,11 +307,12 @@ contains
 
    !> Add the slip of constraint `i` and its derivatives to its condition, which has all nodes of
    !> it, and room for slip.
-   pure subroutine mortar_slip_add(self, faces, i, sight, along, item)
+   pure subroutine mortar_slip_add(self, faces, i, slot, sight, along, item)
       type(mortar_slip_t), intent(in) :: self(:) !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
-      type(slip_sight_t), intent(in) :: sight(:) !! (n_triangle)
+      integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
+      type(slip_sight_t), intent(in) :: sight(:)
       real(wp), intent(in) :: along(3)           !! of `mortar_slave_direction`
       type(condition_t), intent(inout) :: item
       type(slip_cells_t) :: cells
@@ -324,8 +325,8 @@ contains
       call begin_cells(cells, self, faces, i, item%n_node)
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
-            call add_cells(cells, self(t), faces%stencil(t), sight(t), moments_of(self, faces, k) &
-               /total, item%node(:item%n_node))
+            call add_cells(cells, self(t), faces%stencil(t), sight(slot(t)), &
+               moments_of(self, faces, k)/total, item%node(:item%n_node))
          end associate
       end do
       do c = 1, cells%n

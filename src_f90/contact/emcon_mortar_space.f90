@@ -42,7 +42,8 @@ module emcon_mortar_space
       !> By this reach, so far beside triangles, and what may close from so far off [L]
       real(wp) :: chosen(3) = 0.0_wp
       type(mortar_rise_t), allocatable :: rise        !! of both sides; only if gaps follow arcs
-      type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
+      type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured,
+      logical :: knows_start = .false.                !! from where stencils were chosen
       type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
       type(mortar_slip_t), allocatable :: next_slide(:)    !! of the last motion that was looked at
       !> (3, nodes that are looked at) the motions that both are of [L]
@@ -177,6 +178,7 @@ contains
       end if
       is_new = .true.
       call position_memo_take(self%memo, self%faces%near%node, x, u0)
+      self%knows_start = .false.
       self%chosen = [self%reach, self%faces%beside, self%faces%close]
       call mortar_faces_choose(self%faces, x, u0, self%reach, self%acted)
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
@@ -186,7 +188,8 @@ contains
    pure logical function is_chosen(self)
       type(mortar_space_t), intent(in) :: self
 
-      is_chosen = all(abs(self%chosen - [self%reach, self%faces%beside, self%faces%close]) <= 0.0_wp)
+      is_chosen = all(abs(self%chosen - [self%reach, self%faces%beside, self%faces%close]) &
+         <= 0.0_wp)
       if (allocated(self%acted)) is_chosen = is_chosen .and. all(self%faces%may_close .or. &
          .not. self%acted)
    end function is_chosen
@@ -248,16 +251,19 @@ contains
    end subroutine find_sagittas
 
    !> What triangle `t` sees.
-   pure subroutine look(self, t, x, u0, du, basis)
-      class(mortar_space_t), intent(in) :: self
+   pure subroutine look(self, t, x, u0, du, knows_start)
+      class(mortar_space_t), intent(inout) :: self
       integer, intent(in) :: t
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      type(patch_basis_t), intent(out) :: basis
+      logical, intent(in) :: knows_start         !! it has looked from the same start
       real(wp), dimension(3, 3 + self%faces%stencil(t)%patch%n_vertex) :: at, way
 
-      if (self%faces%stencil(t)%triangle == 0) return
+      if (self%faces%stencil(t)%triangle == 0) then
+         self%basis(t) = patch_basis_t()
+         return
+      end if
       call patch_stencil_gather(self%faces%stencil(t), x, u0, du, at, way)
-      basis = patch_basis(self%faces%stencil(t)%patch, at, way)
+      call patch_basis(self%faces%stencil(t)%patch, at, way, knows_start, self%basis(t))
    end subroutine look
 
    !> Mean gaps at both ends of the step; 0 where nothing is covered.
@@ -277,10 +283,13 @@ contains
       type(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       integer :: f, t
+      logical :: is_start                        ! where stencils were chosen
 
+      is_start = position_memo_holds(self%memo, self%faces%near%node, x, u0)
       do t = 1, size(self%faces%stencil)
-         call look(self, t, x, u0, du, self%basis(t))
+         call look(self, t, x, u0, du, self%knows_start .and. is_start)
       end do
+      self%knows_start = is_start
       do f = 1, self%faces%sides%slave%n_facet
          self%theta(:, f) = 0.0_wp
          if (self%faces%is_dual) self%theta(:, f) = covered(self%basis(self%faces%split%start(f): &
@@ -365,38 +374,61 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
       type(condition_t), intent(inout) :: item(:)   !! (n)
-      type(sight_t) :: sight(size(self%faces%stencil))
-      logical :: is_asked(self%faces%sides%slave%n_facet)
+      type(sight_t), allocatable :: sight(:)     !! of the triangles that are asked
+      integer :: slot(size(self%faces%stencil))  !! where each is in it; 0: nowhere
+      integer, allocatable :: facet(:)
       integer :: f, k, t
 
-      is_asked = .false.
-      do k = 1, size(wanted)
-         is_asked(self%faces%split%facet(self%faces%triangle(self%faces%start(wanted(k)): &
-            self%faces%start(wanted(k) + 1) - 1))) = .true.
-      end do
-      do f = 1, size(is_asked)
-         if (.not. is_asked(f)) cycle
-         associate (first => self%faces%split%start(f), last => self%faces%split%start(f + 1) - 1)
+      call find_asked(self%faces, wanted, facet, slot)
+      allocate(sight(maxval([0, slot])))
+      do f = 1, size(facet)
+         associate (first => self%faces%split%start(facet(f)), &
+               last => self%faces%split%start(facet(f) + 1) - 1)
             call mortar_sight(self%faces, first, x, u0, du, all(item%leaves_second), &
-               sight(first:last))
+               sight(slot(first):slot(last)))
             if (.not. any(item%has_friction)) cycle
             do t = first, last
                call mortar_slip_sight(self%slide(t), self%faces%stencil(t), x, u0, du, &
-                  sight(t)%slip)
+                  sight(slot(t))%slip)
             end do
          end associate
       end do
       do k = 1, size(wanted)
-         call mortar_sum(self%faces, wanted(k), sight, target(k) + self%offset &
+         call mortar_sum(self%faces, wanted(k), slot, sight, target(k) + self%offset &
             + self%sagitta(wanted(k)), self%scale(wanted(k)), item(k))
          item(k)%size = self%state(wanted(k))%size
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
-         call mortar_slip_add(self%slide, self%faces, wanted(k), sight%slip, &
+         call mortar_slip_add(self%slide, self%faces, wanted(k), slot, sight%slip, &
             mortar_slave_direction(self%faces, self%faces%sides%slave%node, wanted(k), x, u0), &
             item(k))
       end do
    end subroutine mortar_evaluate
+
+   !> The facets of constraints, and numbers for their triangles.
+   pure subroutine find_asked(faces, wanted, facet, slot)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: wanted(:)           !! 1..n_constraint
+      integer, allocatable, intent(out) :: facet(:)
+      integer, intent(out) :: slot(:)            !! (n_triangle) 1 to their number; 0: none
+      logical :: is_asked(faces%sides%slave%n_facet)
+      integer :: f, k, n, t
+
+      is_asked = .false.
+      do k = 1, size(wanted)
+         is_asked(faces%split%facet(faces%triangle(faces%start(wanted(k)): &
+            faces%start(wanted(k) + 1) - 1))) = .true.
+      end do
+      facet = pack([(f, f = 1, size(is_asked))], is_asked)
+      slot = 0
+      n = 0
+      do k = 1, size(facet)
+         do t = faces%split%start(facet(k)), faces%split%start(facet(k) + 1) - 1
+            n = n + 1
+            slot(t) = n
+         end do
+      end do
+   end subroutine find_asked
 
    !> As `contact_t` has it.
    pure function mortar_slip(self, i, x, u0, du) result(slip)

@@ -1,3 +1,4 @@
+! build: elements
 !> Conditions of mortar contact in space: what the triangles of slave facets see over a step, and
 !> the sum of it over the facets of a vertex. Source: docs/theory.md, section 14.2.
 module emcon_mortar_sum_space
@@ -12,7 +13,7 @@ module emcon_mortar_sum_space
       patch_open_t
    use emcon_patch_look_space, only : patch_t
    use emcon_patch_moments_space, only : patch_area_t
-   use emcon_patch_spread_space, only : patch_spread, patch_uses
+   use emcon_patch_spread_space, only : patch_spread, patch_uses, patch_weights
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
    implicit none
    private
@@ -25,7 +26,8 @@ module emcon_mortar_sum_space
    type :: sight_t
       type(patch_open_t) :: open
       logical, allocatable :: is_used(:)              !! (n_node of the stencil) open depends on it
-      integer, allocatable :: node(:)                 !! these
+      integer, allocatable :: node(:)                 !! these,
+      real(wp), allocatable :: weight(:, :)           !! and what they are in it
       type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
       logical :: is_full = .false.                    !! its facet is covered, but for round-off
       logical :: is_blended = .false.                 !! between the linear multipliers and the dual
@@ -53,11 +55,16 @@ contains
             allocate(at(3, 3 + stencil%patch%n_vertex), way(3, 3 + stencil%patch%n_vertex))
             call patch_stencil_gather(stencil, x, u0, du, at, way)
             call patch_open(stencil%patch, at, way, leaves_second, sight(k)%open)
+            if (sight(k)%open%n_vertex == 0) cycle
             part = part + 2.0_wp*patch_open_cover(sight(k)%open)/real(size(sight), wp)
             associate (open => sight(k)%open)
                sight(k)%is_used = patch_uses(stencil, open%vertex(:open%n_vertex))
             end associate
             sight(k)%node = pack(stencil%node(:stencil%n_node), sight(k)%is_used)
+            associate (open => sight(k)%open)
+               sight(k)%weight = patch_weights(stencil, open%vertex(:open%n_vertex), &
+                  sight(k)%is_used)
+            end associate
          end associate
       end do
       if (.not. self%is_dual) return
@@ -75,12 +82,12 @@ contains
    !> The gap of a triangle with a weight, or what of it is covered.
    pure subroutine gap_of(patch, open, weight, of_cover, target, leaves_second, gap)
       type(patch_t), intent(in) :: patch
-      type(patch_open_t), intent(in) :: open
+      type(patch_open_t), intent(inout) :: open
       real(wp), intent(in) :: weight(3)
       logical, intent(in) :: of_cover
       real(wp), intent(in) :: target             !! [L]
       logical, intent(in) :: leaves_second
-      type(patch_gap_t), intent(out) :: gap
+      type(patch_gap_t), intent(inout) :: gap
       type(patch_area_t) :: area
 
       area = patch%area
@@ -89,10 +96,11 @@ contains
    end subroutine gap_of
 
    !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
-   pure subroutine mortar_sum(self, i, sight, target, scale, item)
+   pure subroutine mortar_sum(self, i, slot, sight, target, scale, item)
       type(mortar_faces_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n
-      type(sight_t), intent(in) :: sight(:)      !! (n_triangle)
+      integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
+      type(sight_t), intent(inout) :: sight(:)
       real(wp), intent(in) :: target             !! height to hold [L]
       real(wp), intent(in) :: scale              !! > 0, what the value is divided by [L^2]
       type(condition_t), intent(inout) :: item
@@ -100,40 +108,38 @@ contains
       type(patch_gap_t) :: gap
       integer :: f, k, n
 
-      call begin_condition(self, i, sight, item)
+      call begin_condition(self, i, slot, sight, item)
       cover%leaves_second = item%leaves_second
       skew%leaves_second = item%leaves_second
       do k = self%start(i), self%start(i + 1) - 1
-         associate (t => self%triangle(k))
+         associate (t => self%triangle(k), s => slot(self%triangle(k)))
             f = self%split%facet(t)
             n = self%split%start(f + 1) - self%split%start(f)
-            if (sight(t)%is_blended .and. t == self%split%start(f)) then
+            if (sight(s)%is_blended .and. t == self%split%start(f)) then
                call condition_start(skew, item%node(:item%n_node), size(item%g, 1))
                call condition_start(cover, item%node(:item%n_node), size(item%g, 1))
             end if
-            if (sight(t)%open%n_vertex > 0) then
-               associate (open => sight(t)%open, patch => self%stencil(t)%patch)
+            if (sight(s)%open%n_vertex > 0) then
+               associate (open => sight(s)%open, patch => self%stencil(t)%patch)
                   call gap_of(patch, open, mortar_slave_weight(self, k, merge(1.0_wp, 0.0_wp, &
-                     sight(t)%is_full)), .false., target, item%leaves_second, gap)
-                  call add_gap(self%stencil(t), sight(t), gap, scale, item)
-                  if (sight(t)%is_blended) then
+                     sight(s)%is_full)), .false., target, item%leaves_second, gap)
+                  call add_gap(sight(s), gap, scale, item)
+                  if (sight(s)%is_blended) then
                      call gap_of(patch, open, self%weights%skew(:, self%vertex(k), t), .false., &
                         target, item%leaves_second, gap)
-                     call add_gap(self%stencil(t), sight(t), gap, scale, skew)
-                     call add_gap(self%stencil(t), sight(t), sight(t)%cover, 0.5_wp*real(n, wp), &
-                        cover)
+                     call add_gap(sight(s), gap, scale, skew)
+                     call add_gap(sight(s), sight(s)%cover, 0.5_wp*real(n, wp), cover)
                   end if
                end associate
             end if
-            if (sight(t)%is_blended .and. t == self%split%start(f) + n - 1) &
+            if (sight(s)%is_blended .and. t == self%split%start(f) + n - 1) &
                call condition_add_cubed(item, cover, skew)
          end associate
       end do
    end subroutine mortar_sum
 
    !> Add a gap of a triangle by `scale` to a condition that has its nodes.
-   pure subroutine add_gap(stencil, sight, gap, scale, item)
-      type(patch_stencil_t), intent(in) :: stencil
+   pure subroutine add_gap(sight, gap, scale, item)
       type(sight_t), intent(in) :: sight
       type(patch_gap_t), intent(in) :: gap
       real(wp), intent(in) :: scale
@@ -143,15 +149,16 @@ contains
       do j = 1, size(place)
          place(j) = findloc(item%node(:item%n_node), sight%node(j), 1)
       end do
-      call patch_spread(stencil, gap, sight%is_used, scale, place, item)
+      call patch_spread(gap, sight%weight, scale, place, item)
    end subroutine add_gap
 
    !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
    !> derivatives yet.
-   pure subroutine begin_condition(self, i, sight, item)
+   pure subroutine begin_condition(self, i, slot, sight, item)
       type(mortar_faces_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n
-      type(sight_t), intent(in) :: sight(:)      !! (n_triangle)
+      integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
+      type(sight_t), intent(in) :: sight(:)
       type(condition_t), intent(inout) :: item
       integer, allocatable :: list(:)
       integer :: k, m, n, pass
@@ -162,7 +169,8 @@ contains
          n = 1
          do pass = 1, 2
             do k = 1, size(triangle)
-               associate (stencil => self%stencil(triangle(k)), of => sight(triangle(k)))
+               associate (stencil => self%stencil(triangle(k)), of => &
+                     sight(slot(triangle(k))))
                   if (.not. (of%open%n_vertex > 0 .or. allocated(of%slip%vertex))) cycle
                   associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)])
                      call nodes_append(pack(stencil%node(:stencil%n_node), uses(stencil, of) &
@@ -183,7 +191,8 @@ contains
       type(sight_t), intent(in) :: sight
       logical :: is_used(stencil%n_node)
 
-      is_used = sight%is_used
+      is_used = .false.
+      if (allocated(sight%is_used)) is_used = sight%is_used
       if (allocated(sight%slip%vertex)) is_used = is_used .or. patch_uses(stencil, &
          sight%slip%vertex)
    end function uses

@@ -1,3 +1,4 @@
+! build: elements
 !> From derivatives by sums of nodes to those by the nodes.
 !>
 !> The sums are of places from the first node on: derivatives by that are minus the sum of the
@@ -18,9 +19,19 @@ contains
       real(wp), intent(in) :: factor             !! of what is added
       integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
       real(wp), intent(inout) :: of_node(:, :)   !! (n_dim, any)
+      real(wp) :: full(size(of_node, 1), size(weight, 1))
+      integer :: i, j
 
-      call nodes_add_first(factor, reshape(matmul(reshape(part, [size(of_node, 1), &
-         size(weight, 2)]), transpose(weight)), [size(of_node, 1)*size(weight, 1)]), place, of_node)
+      full = 0.0_wp
+      associate (n_dim => size(of_node, 1))
+         do j = 1, size(weight, 2)
+            do i = 1, size(weight, 1)
+               if (abs(weight(i, j)) > 0.0_wp) full(:, i) = full(:, i) &
+                  + weight(i, j)*part(n_dim*(j - 1) + 1:n_dim*j)
+            end do
+         end do
+      end associate
+      call nodes_add_first(factor, reshape(full, [size(full)]), place, of_node)
    end subroutine node_sums_first
 
    !> The same of second derivatives.

@@ -26,7 +26,7 @@ module emcon_patch_contact_space
    use emcon_patch_near_space, only : patch_scope_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
-   use emcon_patch_spread_space, only : patch_spread, patch_uses
+   use emcon_patch_spread_space, only : patch_spread, patch_uses, patch_weights
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_height, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -263,8 +263,8 @@ contains
          do i = 1, self%n_constraint
             associate (item => self%sides%frames%point(self%frame(i)))
                associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
-                  scope%facet = pack(of, [(touch_rule_space_sees(self%sides%rule, self%class(i), of(k)) &
-                     .and. near_list_within(self%near, item, of(k), self%reach), &
+                  scope%facet = pack(of, [(touch_rule_space_sees(self%sides%rule, self%class(i), &
+                     of(k)) .and. near_list_within(self%near, item, of(k), self%reach), &
                      k = 1, size(of))])
                end associate
             end associate
@@ -399,7 +399,8 @@ contains
             item%g(:, :n) = 0.0_wp
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
-            call patch_spread(stencil, gap, is_used, self%scale(i), [(k, k = 1, n)], item)
+            call patch_spread(gap, patch_weights(stencil, gap%vertex, is_used), self%scale(i), &
+               [(k, k = 1, n)], item)
             if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
                is_used(2:)), at, way, item)
             if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &

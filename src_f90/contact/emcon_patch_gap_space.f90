@@ -1,3 +1,4 @@
+! build: elements
 !> The height of a surface of triangles over a patch: its mean over a small square that moves with a
 !> node, or its integral over a triangle of a slave facet, with a weight.
 !>
@@ -11,7 +12,7 @@ module emcon_patch_gap_space
    use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moments, &
       patch_products
    use emcon_patch_sum_space, only : add_end, change_of_closing, change_of_parts, close_sum, &
-      closing_t, field_t, form_field, outer, place_field
+      closing_begin, closing_t, field_t, form_field, outer, place_field
    implicit none
    private
    public :: patch_gap_t, patch_gap, patch_open_t, patch_open, patch_open_cover, &
@@ -21,7 +22,7 @@ module emcon_patch_gap_space
    type :: patch_gap_t
       real(wp) :: f0 = 0.0_wp, f1 = 0.0_wp       !! at both ends [L]
       real(wp) :: df = 0.0_wp                    !! how it changes, to relative accuracy [L]
-      integer :: n_vertex = 0                    !! that it depends on
+      integer :: n_vertex = 0                    !! that it depends on: `patch_gap` tells which
       integer, allocatable :: vertex(:)          !! (>= n_vertex) their numbers
       !> By both vectors of the frame, then by the vertices: discrete gradient, that at the end,
       !> and derivative of the first by variables at the end
@@ -29,13 +30,15 @@ module emcon_patch_gap_space
       real(wp), allocatable :: h(:, :)           !! the same twice; only if asked for
    end type patch_gap_t
 
-   !> What the gaps of a patch over a step have in common, whatever their weights and targets are.
+   !> What the gaps of a patch over a step have in common, whatever their weights and targets are,
+   !> and room for those of one of them.
    type :: patch_open_t
       integer :: n_vertex = 0                    !! that they depend on
       integer, allocatable :: vertex(:)          !! (>= n_vertex) their numbers
       real(wp), allocatable, private :: chi(:)               !! (n_vertex)
       type(frame_vertex_t), allocatable, private :: at(:)    !! (n_vertex)
       type(field_t), allocatable, private :: field(:)
+      type(closing_t), private :: closing
       type(frame_area_t), private :: area        !! of the frame, for an integral
    end type patch_open_t
 
@@ -54,6 +57,8 @@ contains
       call patch_open(patch, x, dx, leaves_second, open)
       call patch_gap_of(open, patch%area, patch%of_cover, patch%is_integral, target, &
          leaves_second, gap)
+      gap%n_vertex = open%n_vertex
+      gap%vertex = open%vertex(:open%n_vertex)
    end subroutine patch_gap
 
    !> What a patch is over in a step.
@@ -84,6 +89,7 @@ contains
          end do
          call place_field(corner, open%field(k))
       end do
+      call closing_begin(open%at, open%field, open%closing)
       if (patch%area%n_side == 3) call frame_area(x(:, :3), dx(:, :3), leaves_second, open%area)
    end subroutine patch_open
 
@@ -107,28 +113,50 @@ contains
    !> The gap of a patch.
    pure subroutine patch_gap_of(open, patch_area, of_cover, is_integral, target, leaves_second, &
          gap)
-      type(patch_open_t), intent(in) :: open     !! of the patch
+      type(patch_open_t), intent(inout) :: open  !! of the patch
       type(patch_area_t), intent(in) :: patch_area   !! what that is, with its weight
       logical, intent(in) :: of_cover, is_integral   !! as `patch_t` has them
       real(wp), intent(in) :: target             !! that heights are counted from [L]
       logical, intent(in) :: leaves_second       !! no second derivatives
-      type(patch_gap_t), intent(out) :: gap
-      type(field_t), allocatable :: field(:)
+      type(patch_gap_t), intent(inout) :: gap
       integer :: end, k
 
-      gap%n_vertex = open%n_vertex
-      gap%vertex = open%vertex(:open%n_vertex)
-      field = open%field
+      call make_room(6 + 3*open%n_vertex, leaves_second, gap)
       if (patch_area%n_side == 3) then
-         do k = 1, size(field)
-            do end = 0, 1
-               field(k)%moment(:, end) = matmul(patch_area%weight, field(k)%products(:, :, end))
-            end do
+         do k = 1, size(open%field)
+            associate (f => open%field(k))
+               do end = 0, 1
+                  f%moment(:, end) = matmul(patch_area%weight, f%products(:, :, end))
+               end do
+            end associate
          end do
       end if
-      call add_up(open, patch_area, of_cover, target, field, leaves_second, gap)
+      call add_up(open, patch_area, of_cover, target, leaves_second, gap)
       if (is_integral) call times_area(open%area, leaves_second, gap)
    end subroutine patch_gap_of
+
+   !> No gap yet, of `n` variables.
+   pure subroutine make_room(n, leaves_second, gap)
+      integer, intent(in) :: n
+      logical, intent(in) :: leaves_second
+      type(patch_gap_t), intent(inout) :: gap
+
+      gap%f0 = 0.0_wp
+      gap%f1 = 0.0_wp
+      gap%df = 0.0_wp
+      if (allocated(gap%g)) then
+         if (size(gap%g) /= n) deallocate(gap%g, gap%c)
+      end if
+      if (.not. allocated(gap%g)) allocate(gap%g(n), gap%c(n))
+      gap%g = 0.0_wp
+      gap%c = 0.0_wp
+      if (leaves_second) return
+      if (allocated(gap%h)) then
+         if (size(gap%h, 1) /= n) deallocate(gap%h)
+      end if
+      if (.not. allocated(gap%h)) allocate(gap%h(n, n))
+      gap%h = 0.0_wp
+   end subroutine make_room
 
    !> Times the area of the frame, by the rule of products.
    pure subroutine times_area(area, leaves_second, gap)
@@ -177,13 +205,17 @@ contains
       type(patch_open_t), intent(inout) :: open
       type(field_t) :: field
       integer :: number(patch%n_vertex), i, k, n
+      logical :: is_seen(patch%n_triangle)
 
-      allocate(open%vertex(patch%n_vertex), open%field(count_seen(patch, place)))
+      do k = 1, patch%n_triangle
+         is_seen(k) = .not. is_missed(patch, place(:2, patch%triangle(:, k), :))
+      end do
+      allocate(open%vertex(patch%n_vertex), open%field(count(is_seen)))
       number = 0
       n = 0
       do k = 1, patch%n_triangle
+         if (.not. is_seen(k)) cycle
          associate (t => patch%triangle(:, k))
-            if (is_missed(patch, place(:2, t, :))) cycle
             field = field_t()
             call find_moments(patch, place(:2, t, :), field)
             if (.not. any(abs(field%bare) > 0.0_wp)) cycle
@@ -199,20 +231,8 @@ contains
             open%field(n) = field
          end associate
       end do
-      open%field = open%field(:n)
+      if (n < size(open%field)) open%field = open%field(:n)
    end subroutine choose_fields
-
-   !> The number of triangles that may be over a patch.
-   pure integer function count_seen(patch, place) result(n)
-      type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: place(:, :, 0:)
-      integer :: k
-
-      n = 0
-      do k = 1, patch%n_triangle
-         if (.not. is_missed(patch, place(:2, patch%triangle(:, k), :))) n = n + 1
-      end do
-   end function count_seen
 
    !> Is a triangle beside a patch at both ends?
    pure logical function is_missed(patch, corner)
@@ -242,20 +262,18 @@ contains
    end subroutine find_moments
 
    !> The sum over triangles, docs/theory.md, eqs. (46) and (47).
-   pure subroutine add_up(open, patch_area, of_cover, target, field, leaves_second, gap)
-      type(patch_open_t), intent(in) :: open
+   pure subroutine add_up(open, patch_area, of_cover, target, leaves_second, gap)
+      type(patch_open_t), intent(inout) :: open  !! its fields have their moments
       type(patch_area_t), intent(in) :: patch_area
       logical, intent(in) :: of_cover
       real(wp), intent(in) :: target             !! [L]
-      type(field_t), intent(inout) :: field(:)   !! with their moments
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(inout) :: gap
       real(wp), dimension(3, open%n_vertex) :: by, end_by
       real(wp), dimension(open%n_vertex) :: chi, flat !! of heights, and of 1
       real(wp) :: corner(2, open%n_vertex)       !! at the end
       real(wp) :: height(open%n_vertex, 0:1)
-      real(wp) :: change(3*open%n_vertex, 3*open%n_vertex)
-      type(closing_t) :: closing
+      real(wp), allocatable :: change(:, :)
       integer :: k
 
       chi = open%chi
@@ -270,10 +288,9 @@ contains
       end do
       by = 0.0_wp
       end_by = 0.0_wp
-      do k = 1, size(field)
-         call form_field(chi(field(k)%vertex), flat(field(k)%vertex), target, &
-            height(field(k)%vertex, :), field(k))
-         associate (f => field(k), v => field(k)%vertex)
+      do k = 1, size(open%field)
+         associate (f => open%field(k), v => open%field(k)%vertex)
+            call form_field(chi(v), flat(v), target, height(v, :), f)
             gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
             gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
             by(at_height, v) = by(at_height, v) + chi(v)*f%part
@@ -281,12 +298,16 @@ contains
             call add_end(chi(v), f, end_by)
          end associate
       end do
-      call close_sum(open%at, field, closing)
-      by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta)*closing%way
-      call gather_first(open%at, by, end_by, gap)
-      if (leaves_second) return
-      call change_of_parts(patch_area, chi, corner, field, change)
-      call change_of_closing(patch_area, chi, corner, field, closing, change)
+      associate (closing => open%closing)
+         call close_sum(open%field, closing)
+         by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta) &
+            *closing%way
+         call gather_first(open%at, by, end_by, gap)
+         if (leaves_second) return
+         allocate(change(3*open%n_vertex, 3*open%n_vertex))
+         call change_of_parts(patch_area, chi, corner, open%field, change)
+         call change_of_closing(patch_area, chi, corner, open%field, closing, change)
+      end associate
       call gather_second(open%at, by, change, gap)
    end subroutine add_up
 
@@ -297,7 +318,6 @@ contains
       type(patch_gap_t), intent(inout) :: gap
       integer :: j
 
-      allocate(gap%g(6 + 3*size(at)), gap%c(6 + 3*size(at)), source=0.0_wp)
       do j = 1, size(at)
          gap%df = gap%df + dot_product(by(:, j), at(j)%df)
          associate (place => places(j))
@@ -315,7 +335,6 @@ contains
       real(wp) :: sums(3, 6 + 3*size(at))        !! what places and heights of a vertex take
       integer :: column(n_frame_var), i, j, k, l
 
-      allocate(gap%h(6 + 3*size(at), 6 + 3*size(at)), source=0.0_wp)
       do j = 1, size(at)
          sums = 0.0_wp
          do l = 1, size(at)

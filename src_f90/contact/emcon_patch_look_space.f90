@@ -1,3 +1,4 @@
+! build: elements
 !> What a patch over a surface of triangles sees: a small square that moves with a node, or a
 !> triangle of a slave facet. Source: docs/theory.md, eqs. (43) to (46).
 module emcon_patch_look_space
@@ -119,34 +120,49 @@ contains
 
    !> What a patch of a slave facet sees at both ends of a step, with each of the weights that are 1
    !> at one of the `unit_corner` and 0 at the others.
-   pure function patch_basis(patch, x, dx) result(basis)
+   pure subroutine patch_basis(patch, x, dx, knows_start, basis)
       type(patch_t), intent(in) :: patch         !! that looks
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      type(patch_basis_t) :: basis
-      real(wp) :: place(3, patch%n_vertex, 0:1), products(3, 3), share(3)
-      integer :: end, k, v
+      logical, intent(in) :: knows_start         !! `basis` is of this patch, from the same start
+      type(patch_basis_t), intent(inout) :: basis
+      real(wp) :: place(3, patch%n_vertex, 0:1)
 
-      do end = 0, 1
-         call place_vertices(patch, x + end*dx, place(:, :, end))
-         associate (size_of => frame_size(x(:, :3) + end*dx(:, :3)), height => &
-               basis%height(:, end), cover => basis%cover(:, end), p => place(:, :, end))
-            basis%area(end) = 0.5_wp*size_of
-            do k = 1, patch%n_triangle
-               associate (t => patch%triangle(:, k))
-                  if (patch_misses(patch%area, p(:2, t))) cycle
-                  products = size_of*patch_products(patch%area, p(:2, t))
-                  do v = 1, 3
-                     share = barycentric(p(:2, t), unit_corner(:, v))*patch%chi(t)
-                     height = height + products(:, v)*dot_product(share, p(3, t))
-                     cover = cover + products(:, v)*sum(share)
-                  end do
-               end associate
+      call place_vertices(patch, x, place(:, :, 0))
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      if (.not. knows_start) call find_basis(patch, frame_size(x(:, :3)), place(:, :, 0), &
+         basis%height(:, 0), basis%cover(:, 0), basis%area(0))
+      call find_basis(patch, frame_size(x(:, :3) + dx(:, :3)), place(:, :, 1), &
+         basis%height(:, 1), basis%cover(:, 1), basis%area(1))
+      basis%way = longest_way(patch, x, place)
+      basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+   end subroutine patch_basis
+
+   !> The same at one configuration.
+   pure subroutine find_basis(patch, size_of, place, height, cover, area)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: size_of            !! of the frame [L^2]
+      real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
+      real(wp), intent(out) :: height(3), cover(3), area
+      real(wp) :: products(3, 3), share(3), corner(2, 3)
+      integer :: k, v
+
+      area = 0.5_wp*size_of
+      height = 0.0_wp
+      cover = 0.0_wp
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k))
+            corner = place(:2, t)
+            products = patch_products(patch%area, corner)
+            if (.not. sum(products) > 0.0_wp) cycle
+            products = size_of*products
+            do v = 1, 3
+               share = barycentric(corner, unit_corner(:, v))*patch%chi(t)
+               height = height + products(:, v)*dot_product(share, place(3, t))
+               cover = cover + products(:, v)*sum(share)
             end do
          end associate
       end do
-      basis%way = longest_way(patch, x, place)
-      basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
-   end function patch_basis
+   end subroutine find_basis
 
    !> How far vertices go along a patch, at most [L].
    pure real(wp) function longest_way(patch, x, place) result(way)
@@ -174,17 +190,18 @@ contains
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
       real(wp), intent(out) :: height, cover
-      real(wp) :: moment(3), bare(3), share(3)
+      real(wp) :: moment(3), bare(3), share(3), corner(2, 3)
       integer :: k, v
 
       height = 0.0_wp
       cover = 0.0_wp
       do k = 1, patch%n_triangle
          associate (t => patch%triangle(:, k))
-            if (patch_misses(patch%area, place(:2, t))) cycle
-            call patch_moments(patch%area, place(:2, t), moment, bare)
+            corner = place(:2, t)
+            if (patch_misses(patch%area, corner)) cycle
+            call patch_moments(patch%area, corner, moment, bare)
             do v = 1, 3
-               share = moment(v)*barycentric(place(:2, t), unit_corner(:, v))
+               share = moment(v)*barycentric(corner, unit_corner(:, v))
                height = height + dot_product(share, patch%chi(t)*place(3, t))
                cover = cover + dot_product(share, patch%chi(t))
             end do
@@ -197,15 +214,17 @@ contains
    pure real(wp) function height_ahead(patch, from, to) result(least)
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: from(:, :), to(:, :)   !! (3, n_vertex)
+      real(wp) :: corner(2, 3)
       integer :: k
 
       least = huge(least)
       do k = 1, patch%n_triangle
-         associate (t => patch%triangle(:, k))
-            if (patch_misses(patch%area, to(:2, t))) cycle
+         associate (t => patch%triangle(:, k), centre => patch%area%centre)
+            corner = to(:2, t)
+            if (patch_misses(patch%area, corner)) cycle
             if (any(patch%chi(t) <= 0.0_wp)) cycle
-            least = min(least, dot_product(barycentric(from(:2, t), spread(patch%area%centre, 1, &
-               2)), from(3, t)))
+            corner = from(:2, t)
+            least = min(least, dot_product(barycentric(corner, [centre, centre]), from(3, t)))
          end associate
       end do
    end function height_ahead

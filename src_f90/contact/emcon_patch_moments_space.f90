@@ -1,3 +1,4 @@
+! build: elements
 !> What a triangle covers of a patch: moments of the common polygon, and how they change with the
 !> corners.
 !>

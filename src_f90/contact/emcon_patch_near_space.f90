@@ -1,3 +1,4 @@
+! build: elements
 !> The triangles of the master that are near a slave point: the nearest one that a frame is to see,
 !> and what hangs together with it. Source: docs/theory.md, section 14.
 module emcon_patch_near_space
@@ -10,7 +11,7 @@ module emcon_patch_near_space
    implicit none
    private
    public :: patch_scope_t, patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
-      patch_near_goes_on
+      patch_near_goes_on, patch_outline_t, patch_outline, patch_outline_misses
 
    !> A triangle faces a frame if the cosine of their normals is below this.
    real(wp), parameter :: facing = -0.25_wp
@@ -31,6 +32,12 @@ module emcon_patch_near_space
       real(wp) :: beside = huge(1.0_wp)          !! a triangle of the slave sees what is beside it
                                                  !! by no more [L]
    end type patch_scope_t
+
+   !> A triangle of the slave as it sees what is beside it.
+   type :: patch_outline_t
+      real(wp) :: out(3, 3) = 0.0_wp             !! (:, k) outwards from side k, of length 1
+      real(wp) :: at(3) = 0.0_wp                 !! where its sides are along these [L]
+   end type patch_outline_t
 
    !> Triangles that are near, seen from the contact point.
    type :: patch_near_t
@@ -94,42 +101,71 @@ contains
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
             if (is_mirror(sides, i, near%triangle(t))) n = 0.0_wp
             associate (f => sides%triangles%split%facet(near%triangle(t)), &
-                  way => matmul(c, nearest%weight))
+                  way => c(:, 1)*nearest%weight(1) + c(:, 2)*nearest%weight(2) &
+                  + c(:, 3)*nearest%weight(3))
                if (touch_rule_space_is_through(sides%rule, i, f, n, -way)) n = 0.0_wp
                if (touch_rule_space_is_beyond(sides%rule, i, f, own, way)) n = 0.0_wp
             end associate
             nearest = nearest_t()
          end associate
       end do
-      if (sides%frames%of_triangles) call find_beside(near, frame_sides(sides%frames, i, &
-         sides%frames%base(i), x, u), origin, scope%beside + narrow_flange &
-         *sides%triangles%size(near%triangle))
+      if (sides%frames%of_triangles) call find_beside(near, patch_outline(sides, i, x, u), &
+         origin, scope%beside + narrow_flange*sides%triangles%size(near%triangle))
    end subroutine patch_near_find
 
-   !> Find what is beside a triangle of the slave, on the outside of one of its sides.
-   pure subroutine find_beside(near, side, origin, beside)
+   !> Find what is beside a triangle of the slave.
+   pure subroutine find_beside(near, outline, origin, beside)
       type(patch_near_t), intent(inout) :: near
-      real(wp), intent(in) :: side(3, 2)         !! of it, from its first corner [L]
-      real(wp), intent(in) :: origin(3)          !! its contact point, from there [L]
+      type(patch_outline_t), intent(in) :: outline   !! of it
+      real(wp), intent(in) :: origin(3)          !! its contact point, from its base [L]
       real(wp), intent(in) :: beside(:)          !! (n) by more [L]
-      real(wp) :: corner(3, 3), along(3), out(3)
-      integer :: k, t
+      type(patch_outline_t) :: own
+      integer :: t
 
-      corner(:, 1) = -origin
-      corner(:, 2:) = side - spread(origin, 2, 2)
-      associate (normal => cross_product(side(:, 1), side(:, 2)))
-         do k = 1, 3
-            along = corner(:, 1 + mod(k, 3)) - corner(:, k)
-            out = cross_product(along, normal)
-            out = out/max(sqrt(dot_product(out, out)), tiny(out))
-            do t = 1, near%n
-               if (near%is_beside(t)) cycle
-               near%is_beside(t) = all(matmul(out, near%corner(:, :, t)) &
-                  > dot_product(out, corner(:, k)) + beside(t))
-            end do
-         end do
-      end associate
+      own = patch_outline_t(outline%out, outline%at - matmul(origin, outline%out))
+      do t = 1, near%n
+         if (.not. near%is_beside(t)) near%is_beside(t) = patch_outline_misses(own, &
+            near%corner(:, :, t), beside(t))
+      end do
    end subroutine find_beside
+
+   !> The outline of slave triangle `i`, from its base.
+   pure type(patch_outline_t) function patch_outline(sides, i, x, u) result(outline)
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: i                   !! 1 to the number of triangles
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: corner(3, 3), normal(3)
+      integer :: k
+
+      corner(:, 1) = 0.0_wp
+      corner(:, 2:) = frame_sides(sides%frames, i, sides%frames%base(i), x, u)
+      normal = cross_product(corner(:, 2), corner(:, 3))
+      do k = 1, 3
+         associate (out => outline%out(:, k))
+            out = cross_product(corner(:, 1 + mod(k, 3)) - corner(:, k), normal)
+            out = out/max(sqrt(dot_product(out, out)), tiny(out))
+            outline%at(k) = dot_product(out, corner(:, k))
+         end associate
+      end do
+   end function patch_outline
+
+   !> Is all of a facet beside an outline by more than `beside`, as one of its sides shows?
+   pure logical function patch_outline_misses(outline, corner, beside) result(misses)
+      type(patch_outline_t), intent(in) :: outline
+      real(wp), intent(in) :: corner(:, :)       !! (3, any) from its base [L]
+      real(wp), intent(in) :: beside             !! [L]
+      integer :: j, k
+
+      sides: do k = 1, 3
+         misses = .true.
+         do j = 1, size(corner, 2)
+            misses = dot_product(outline%out(:, k), corner(:, j)) > outline%at(k) + beside
+            if (.not. misses) cycle sides
+         end do
+         return
+      end do sides
+      misses = .false.
+   end function patch_outline_misses
 
    !> Contact point `i` of the slave, from its base.
    pure function point_origin(sides, i, x, u) result(origin)
@@ -228,11 +264,14 @@ contains
       real(wp), intent(in) :: normal(3), corner(3, 3)
       real(wp), intent(out) :: way, height       !! [L]
       type(nearest_t) :: nearest
-      real(wp) :: ahead(3)
+      real(wp) :: ahead(3), flat(3, 3)
+      integer :: k
 
-      ahead = matmul(normal, corner)
-      call nearest_update(nearest, 1, [0.0_wp, 0.0_wp, 0.0_wp], corner - spread(normal, 2, 3) &
-         *spread(ahead, 1, 3))
+      do k = 1, 3
+         ahead(k) = dot_product(normal, corner(:, k))
+         flat(:, k) = corner(:, k) - normal*ahead(k)
+      end do
+      call nearest_update(nearest, 1, [0.0_wp, 0.0_wp, 0.0_wp], flat)
       way = sqrt(nearest%square)
       height = dot_product(nearest%weight, ahead)
    end subroutine look_along
@@ -368,12 +407,14 @@ contains
       integer, intent(in) :: other               !! of the master; 0: none
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
 
-      goes_on = other > 0
-      if (goes_on) goes_on = faces(near, sides, other, x, u)
-      if (.not. goes_on) return
+      goes_on = .false.
+      if (other == 0) return
       associate (k => find_sorted(near%triangle, other))
-         if (k > 0) goes_on = .not. near%is_apart(k)
+         if (k > 0) then
+            if (near%is_apart(k)) return
+         end if
       end associate
+      goes_on = faces(near, sides, other, x, u)
    end function patch_near_goes_on
 
    !> Does a triangle face the frame?

@@ -1,3 +1,4 @@
+! build: elements
 !> Both sides of contact of nodes in space, as they are made once: frames that move with the nodes
 !> of the slave, and triangles of the master with what is beyond their sides.
 !>

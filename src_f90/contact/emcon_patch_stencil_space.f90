@@ -1,3 +1,4 @@
+! build: elements
 !> Which triangles of the master the patch of a slave node looks at in a step, and which nodes these
 !> are made of.
 !>
@@ -57,9 +58,9 @@ module emcon_patch_stencil_space
 
 contains
 
-   !> Choose the stencil of frame `frame` of the slave at x + u, where the facets of `scope` are near
-   !> its node: the nearest triangle that faces this frame more than any other of the node, and what
-   !> hangs together with that and faces the frame too.
+   !> Choose the stencil of frame `frame` of the slave at x + u, where the facets of `scope` are
+   !> near its node: the nearest triangle that faces this frame more than any other of the node, and
+   !> what hangs together with that and faces the frame too.
    pure subroutine patch_stencil_choose(self, sides, frame, scope, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides

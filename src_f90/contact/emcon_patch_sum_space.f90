@@ -1,3 +1,4 @@
+! build: elements
 !> The sum over the triangles that a patch is over in a step, and how it changes: fields, what each
 !> vertex takes, and what closes the discrete gradient. Source: docs/theory.md, eqs. (46) to (49).
 module emcon_patch_sum_space
@@ -8,8 +9,8 @@ module emcon_patch_sum_space
    use emcon_polygon_clip_space, only : barycentric
    implicit none
    private
-   public :: field_t, place_field, form_field, add_end, change_of_parts, closing_t, close_sum, &
-      change_of_closing, outer
+   public :: field_t, place_field, form_field, add_end, change_of_parts, closing_t, closing_begin, &
+      close_sum, change_of_closing, outer
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
@@ -163,23 +164,18 @@ contains
       lean(2, :) = share(:, 3) - share(:, 1)
    end function gradients
 
-   !> What the gradient lacks, put on the ways of the vertices, each by what it has to do with the
-   !> patch: docs/theory.md, eq. (48).
-   pure subroutine close_sum(at, field, closing)
+   !> The ways of the vertices, each by what it has to do with the patch: docs/theory.md, eq. (48).
+   pure subroutine closing_begin(at, field, closing)
       type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
-      type(field_t), intent(in) :: field(:)      !! the triangles, formed
-      type(closing_t), intent(out) :: closing    !! what is put on the ways
-      real(wp) :: rest, square, size_of, ratio, area(size(at))
+      type(field_t), intent(in) :: field(:)      !! the triangles, placed
+      type(closing_t), intent(out) :: closing
+      real(wp) :: area(size(at))
       integer :: j, k
 
-      rest = 0.0_wp
-      size_of = tiny(size_of)
       area = 0.0_wp
       do k = 1, size(field)
-         associate (f => field(k), v => field(k)%vertex)
-            rest = rest + dot_product(f%moment(:, 1) - f%moment(:, 0), sum(f%value, 2)/2.0_wp)
-            size_of = max(size_of, maxval(sum(abs(f%value), 2)))
-            area(v) = area(v) + sum(f%bare)
+         associate (v => field(k)%vertex)
+            area(v) = area(v) + sum(field(k)%bare)
          end associate
       end do
       closing%weight = area/(area + some)
@@ -187,6 +183,23 @@ contains
       allocate(closing%way(at_eta, size(at)))
       do j = 1, size(at)
          closing%way(:, j) = at(j)%df(:at_eta)
+      end do
+   end subroutine closing_begin
+
+   !> What the gradient lacks, put on the ways of the vertices.
+   pure subroutine close_sum(field, closing)
+      type(field_t), intent(in) :: field(:)      !! the triangles, formed
+      type(closing_t), intent(inout) :: closing  !! begun
+      real(wp) :: rest, square, size_of, ratio
+      integer :: k
+
+      rest = 0.0_wp
+      size_of = tiny(size_of)
+      do k = 1, size(field)
+         associate (f => field(k))
+            rest = rest + dot_product(f%moment(:, 1) - f%moment(:, 0), sum(f%value, 2)/2.0_wp)
+            size_of = max(size_of, maxval(sum(abs(f%value), 2)))
+         end associate
       end do
       ! By ways of round-off nothing is divided.
       square = rounding + sum(spread(closing%weight, 1, at_eta)*closing%way**2)

@@ -1,3 +1,4 @@
+! build: elements
 !> What a convex polygon of the plane covers of a triangle: their common polygon, with no tolerance.
 !>
 !> The convex polygon is the set of places y at which all of its sides, s(1) + s(2) y1 + s(3) y2,
@@ -90,8 +91,11 @@ contains
       real(wp), intent(in) :: y(2)               !! in the same coordinates
       real(wp) :: share(3)
       real(wp) :: d(2, 3)
+      integer :: k
 
-      d = corner - spread(y, 2, 3)
+      do k = 1, 3
+         d(:, k) = corner(:, k) - y
+      end do
       share = [turn(d(:, 2), d(:, 3)), turn(d(:, 3), d(:, 1)), turn(d(:, 1), d(:, 2))] &
          /turn(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
 
