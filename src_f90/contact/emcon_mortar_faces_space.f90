@@ -28,7 +28,7 @@ module emcon_mortar_faces_space
 
    !> A vertex may close in a step if a facet of it is no farther off than this fraction of the mean
    !> facet of the master, or than what two nodes can close by the largest motion in the step.
-   real(wp), parameter :: close_per_facet = 0.125_wp, close_per_motion = 2.0_wp
+   real(wp), parameter :: close_per_facet = 0.05_wp, close_per_motion = 2.0_wp
 
    type, extends(mortar_slave_t) :: mortar_faces_t
       type(patch_sides_t) :: sides
@@ -36,7 +36,8 @@ module emcon_mortar_faces_space
       type(near_list_t) :: near
       real(wp) :: beside = 0.0_wp                     !! so far beside triangles, as above [L]
       real(wp) :: close = 0.0_wp                      !! so far off a facet may close, as above [L]
-      logical, allocatable :: may_close(:)            !! (n) in the step: only these are measured
+      logical, allocatable :: may_close(:)            !! (n) in the step, or are watched: only
+                                                      !! these are measured
       integer :: n_sifted = 0                         !! the list that `sift` has gone through
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_triangle)
    end type mortar_faces_t
@@ -116,11 +117,11 @@ contains
 
    !> The stencils of all triangles for a step that begins at x + u0; none where no vertex of their
    !> facet may close.
-   pure subroutine mortar_faces_choose(self, x, u0, reach, acted)
+   pure subroutine mortar_faces_choose(self, x, u0, reach, is_watched)
       type(mortar_faces_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
       real(wp), intent(in) :: reach              !! what is farther is not seen [L]
-      logical, intent(in), optional :: acted(:)  !! (n) vertices that may close anyway; none
+      logical, intent(in), optional :: is_watched(:)   !! (n) measured if they are near; none
       logical :: is_wanted(self%sides%slave%n_facet)
       integer :: f, i
 
@@ -128,7 +129,7 @@ contains
       do i = 1, size(self%node)
          self%may_close(i) = any(is_wanted(facets_of(self, i)))
       end do
-      if (present(acted)) self%may_close = self%may_close .or. acted
+      if (present(is_watched)) self%may_close = self%may_close .or. is_watched
       do i = 1, size(self%node)
          if (self%may_close(i)) is_wanted(facets_of(self, i)) = .true.
       end do

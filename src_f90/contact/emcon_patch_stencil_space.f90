@@ -288,7 +288,7 @@ contains
          if (.not. allocated(self%weight)) allocate(self%weight(max_face_nodes, 2 + most_points), &
             self%node(max_face_nodes), self%flip(max_face_nodes))
       end associate
-      self%weight = 0.0_wp
+      self%weight(:, :2) = 0.0_wp
       self%n_node = 1
       self%node(1) = sides%frames%base(sides%frames%point(frame))
       self%flip = 0
@@ -386,6 +386,7 @@ contains
       self%patch%n_vertex = vertex
       self%point(vertex) = point
       self%patch%chi(vertex) = chi
+      self%weight(:, 2 + vertex) = 0.0_wp
       self%weight(2:self%n_origin, 2 + vertex) = -self%origin(2:self%n_origin)
    end subroutine begin_vertex
 

@@ -12,7 +12,8 @@ module emcon_factor_policy
    use emcon_evaluation, only : instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_look, kept_factor_multipliers, kept_factor_reach, &
+      kept_factor_is_possible, kept_factor_is_straight, kept_factor_look, &
+      kept_factor_multipliers, kept_factor_reach, &
       kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
@@ -125,8 +126,9 @@ contains
       call mixing_begin(self%mixing, n_unknown)
    end subroutine factor_policy_begin
 
-   !> Are second derivatives of the constraints to be looked at? They are as a solve begins and
-   !> after its first correction, which takes it most of the way.
+   !> Are second derivatives of the constraints to be looked at? They are as a solve begins and,
+   !> unless they say next to nothing then, after its first correction, which takes it most of the
+   !> way.
    pure logical function factor_policy_looks(self)
       type(factor_policy_t), intent(in) :: self
 
@@ -157,6 +159,7 @@ contains
       if (factor_policy_looks(self)) then
          call kept_factor_look(correction%kept, set, system%space%numbering)
          self%n_look = self%n_look + 1
+         if (kept_factor_is_straight(correction%kept, set)) self%n_look = most_looks
       end if
    end subroutine factor_policy_make
 

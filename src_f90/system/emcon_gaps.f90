@@ -39,7 +39,7 @@ contains
       call phase_leave(system%phases, left)
    end subroutine pair_measure
 
-   !> Choose stencils for `motion`, and measure by them.
+   !> Choose stencils for `motion`, and measure by them whatever is near.
    subroutine gaps_search(system, motion, gap)
       type(system_t), intent(inout) :: system                     !! its contacts
       type(motion_t), intent(in) :: motion                        !! from `u0` by `du`
@@ -48,6 +48,9 @@ contains
 
       call gaps_forget(system)
       do i = 1, size(system%contact)
+         associate (contact => system%contact(i)%contact)
+            contact%is_watched = spread(.true., 1, contact%n_constraint)
+         end associate
          call pair_search(system, i, motion)
       end do
       call gaps_measure(system, motion, gap)
