@@ -226,9 +226,10 @@ contains
          self%friction%tau0 = state%contacts%drag
       end if
       do pair = 1, size(system%contact)
-         associate (contact => system%contact(pair)%contact, first => system%first_constraint(pair), &
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            contact%is_watched = self%start%was_active(first + 1:last)
+            contact%step%is_watched = self%start%was_active(first:last)
             contact%step%is_sharp = .false.
             contact%step%is_static = evaluation_is_equilibrium(motion%evaluation)
             contact%step%pushes_at_end = contact%step%is_static .or. motion%evaluation%pushes_at_end

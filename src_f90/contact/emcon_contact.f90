@@ -50,6 +50,9 @@ module emcon_contact
       logical :: has_compliance = .false.             !! by a penalty, or augmented
       logical :: is_penalty = .false.                 !! it stores what it takes: a penalty
       real(wp) :: engages = 0.0_wp                    !! the gap at which that begins, if > 0 [L]
+      !> (n_constraint) it is measured if it is near, whether or not it may close in the step; not
+      !> allocated: none of them
+      logical, allocatable :: is_watched(:)
    end type contact_step_t
 
    type, abstract, extends(constraint_t) :: contact_t
@@ -74,9 +77,6 @@ module emcon_contact
       !> of would be seen only with a motion that goes through the surface [L].
       real(wp) :: max_gap_on_entry = huge(1.0_wp)
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
-      !> (n_constraint) it is measured if it is near, whether or not it may close in the step; not
-      !> allocated: none of them
-      logical, allocatable :: is_watched(:)
       !> (n_constraint) the other slave node at the same place of a surface of tied pieces; 0: none
       integer, allocatable :: duplicate(:)
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]

@@ -312,7 +312,7 @@ contains
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
-      type(slip_sight_t), intent(in) :: sight(:)
+      type(slip_sight_t), intent(in) :: sight(:) !! what triangles see
       real(wp), intent(in) :: along(3)           !! of `mortar_slave_direction`
       type(condition_t), intent(inout) :: item
       type(slip_cells_t) :: cells

@@ -180,7 +180,7 @@ contains
       call position_memo_take(self%memo, self%faces%near%node, x, u0)
       self%knows_start = .false.
       self%chosen = [self%reach, self%faces%beside, self%faces%close]
-      call mortar_faces_choose(self%faces, x, u0, self%reach, self%is_watched)
+      call mortar_faces_choose(self%faces, x, u0, self%reach, self%step%is_watched)
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
    end subroutine choose_stencils
 
@@ -190,8 +190,8 @@ contains
 
       is_chosen = all(abs(self%chosen - [self%reach, self%faces%beside, self%faces%close]) &
          <= 0.0_wp)
-      if (allocated(self%is_watched)) is_chosen = is_chosen .and. all(self%faces%may_close .or. &
-         .not. self%is_watched)
+      if (allocated(self%step%is_watched)) is_chosen = is_chosen .and. &
+         all(self%faces%may_close .or. .not. self%step%is_watched)
    end function is_chosen
 
    !> What slips would be made of where forces act by this motion. It is taken over as a step begins

@@ -100,7 +100,7 @@ contains
       type(mortar_faces_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n
       integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
-      type(sight_t), intent(inout) :: sight(:)
+      type(sight_t), intent(inout) :: sight(:)   !! what triangles see
       real(wp), intent(in) :: target             !! height to hold [L]
       real(wp), intent(in) :: scale              !! > 0, what the value is divided by [L^2]
       type(condition_t), intent(inout) :: item

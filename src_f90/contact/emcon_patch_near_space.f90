@@ -63,7 +63,7 @@ contains
       type(patch_near_t), intent(out) :: near
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: i                   !! 1 to the number of contact points
-      type(patch_scope_t), intent(in) :: scope
+      type(patch_scope_t), intent(in) :: scope   !! the facets
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(nearest_t) :: nearest
       real(wp) :: origin(3), own(3)

@@ -65,7 +65,7 @@ contains
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame               !! 1 to the number of all frames
-      type(patch_scope_t), intent(in) :: scope
+      type(patch_scope_t), intent(in) :: scope   !! what is near
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(patch_near_t) :: near
       real(wp) :: normal(3)

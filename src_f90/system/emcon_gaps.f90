@@ -49,7 +49,7 @@ contains
       call gaps_forget(system)
       do i = 1, size(system%contact)
          associate (contact => system%contact(i)%contact)
-            contact%is_watched = spread(.true., 1, contact%n_constraint)
+            contact%step%is_watched = spread(.true., 1, contact%n_constraint)
          end associate
          call pair_search(system, i, motion)
       end do
