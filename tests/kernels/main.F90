@@ -32,6 +32,7 @@ program main
    use test_condition_nodes, only : collect_condition_nodes
    use test_condition_rows, only : collect_condition_rows
    use test_contact_parts, only : collect_contact_parts
+   use test_contact_following, only : collect_contact_following
    use test_contact_problem, only : collect_contact_problem
    use test_contact_rounds, only : collect_contact_rounds
    use test_constraints, only : collect_constraints
@@ -375,6 +376,7 @@ program main
    call run("condition_nodes", collect_condition_nodes)
    call run("condition_rows", collect_condition_rows)
    call run("contact_parts", collect_contact_parts)
+   call run("contact_following", collect_contact_following)
    call run("contact_problem", collect_contact_problem)
    call run("contact_rounds", collect_contact_rounds)
    call run("constraints", collect_constraints)
