@@ -513,7 +513,7 @@ contains
          end if
          status = newton_singular
          if (allocated(error) .or. self%condensation%is_singular) return
-         call solve_condensed(self, set, is_solved)
+         call solve_condensed(self, set, newton%n_solve > 0, is_solved)
          call phase_leave(system%phases, left)
          if (is_solved .or. .not. has_curvature) exit
          self%rest%n_stall = stall_turn
@@ -551,20 +551,31 @@ contains
       if (is_found) then
          newton%convergence%n_iteration = newton%convergence%n_iteration + 1
          call find_hold(self, system, set)
-         call solve_condensed(self, set, is_found)
+         call solve_condensed(self, set, newton%n_solve > 0, is_found)
       end if
       if (is_found) self%status = contact_problem_status(self%problem, self%push)
       call phase_leave(system%phases, left)
    end subroutine condense_by_kept
 
-   !> Forces that obey the laws as the step is condensed; softer where there are none.
-   subroutine solve_condensed(self, set, is_solved)
+   !> Forces that obey the laws as the step is condensed; softer where there are none. If slip has
+   !> a direction and there was an iterate before they are first looked for near its forces, as long
+   !> as that gains; then every other time far from those, where what follows from others leaves its
+   !> limits.
+   subroutine solve_condensed(self, set, is_near, is_solved)
       type(contact_newton_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
+      logical, intent(in) :: is_near             !! there was an iterate before
       logical, intent(out) :: is_solved
       type(contact_effort_t) :: effort
       integer :: level
 
+      if (self%turns .and. is_near .and. .not. btest(self%rest%n_stall, 0)) then
+         call lay_out(self, set)
+         self%push = 0.0_wp
+         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true., self%slope, &
+            .true.)
+         if (is_solved) return
+      end if
       do level = self%least_soft, size(softer)
          call lay_out(self, set)
          self%push = 0.0_wp

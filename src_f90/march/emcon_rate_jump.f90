@@ -5,8 +5,8 @@
 module emcon_rate_jump
    use emcon_constraints, only : constraint_set_t
    use emcon_contact_parts, only : contact_parts_solve
-   use emcon_contact_problem, only : contact_effort_t, contact_problem_missed, contact_problem_t, &
-      met, nearly_met
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_map, &
+      contact_problem_missed, contact_problem_t, met, nearly_met
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_system, only : mass_times, system_t
@@ -14,7 +14,7 @@ module emcon_rate_jump
       velocity_mass_pick, velocity_mass_prepare, velocity_mass_respond, velocity_update_t
    implicit none
    private
-   public :: rate_jump_t, velocity_update_change
+   public :: rate_jump_t, stopping_t, rate_jump_solve, velocity_update_change
 
    !> Laws that are met to this part need no jump: a sum of some products.
    real(wp), parameter :: rounded = 64.0_wp*epsilon(1.0_wp)
@@ -22,6 +22,16 @@ module emcon_rate_jump
    !> part of the largest impulse. What it leaves of rates the next step begins with: no drift; but
    !> without the jump all that it would stop turns back.
    real(wp), parameter :: nearly_stopped = 1.0e-6_wp
+
+   !> What a jump for that which friction stops has beside its problem.
+   type :: stopping_t
+      !> (0:n_slip, n) impulses of the step that stay
+      logical, allocatable :: stays(:, :)
+      logical, allocatable :: slides(:)          !! (n) on, unless the jump turns it back
+      !> (n_slip, n) of slips the other way round: what a stop takes, and twice the mean rates that
+      !> the step has with the velocities before the jump [L/T]
+      real(wp), allocatable :: rate(:, :), mean(:, :)
+   end type stopping_t
 
    !> A jump that changes the rates of contacts by impulses along the gradients C of their gaps and
    !> slips, as laws say that take impulses and rates for forces and motions.
@@ -31,9 +41,8 @@ module emcon_rate_jump
       type(contact_problem_t) :: problem
       !> (0:n_slip, n) of gaps, and of slips the other way round, before [L/T]
       real(wp), allocatable :: rate(:, :)
-      !> (0:n_slip, n) impulses of the step that stay. Allocated: the jump is for what friction
-      !> stops by itself, at the end of the step
-      logical, allocatable :: stays(:, :)
+      !> Allocated: the jump is for what friction stops by itself, at the end of the step
+      type(stopping_t), allocatable :: stopping
       logical :: is_done = .false.               !! .false.: there is none to take, or it would make
                                                  !! energy
       logical :: is_idle = .false.               !! laws are met without it, to round-off
@@ -57,9 +66,8 @@ contains
       type(rate_jump_t), intent(inout) :: jump
       real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: momentum(size(v, 1), size(v, 2)), after(size(jump%rate, 1), size(jump%rate, 2))
+      real(wp) :: momentum(size(v, 1), size(v, 2))
       real(wp), allocatable :: response(:, :)
-      type(contact_effort_t) :: effort
       logical :: is_singular
 
       jump%is_done = .false.
@@ -68,52 +76,117 @@ contains
       if (allocated(error) .or. is_singular) return
       call find_compliance(self, system, set, jump, response, is_singular, error)
       if (allocated(error) .or. is_singular) return
-      if (allocated(jump%impulse)) deallocate(jump%impulse)
-      allocate(jump%impulse(0:jump%problem%n_slip, size(jump%row)), source=0.0_wp)
-      jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= rounded
-      if (jump%is_idle) return
-      call contact_parts_solve(jump%problem, jump%impulse, effort, jump%is_done, .true.)
-      if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
-         <= merge(nearly_stopped, nearly_met, jump%problem%n_slip > 1)
-      if (.not. jump%is_done) return
-      ! Pushes of the step that pull by round-off are those of the step, too.
-      if (allocated(jump%stays)) where (jump%stays) jump%impulse = 0.0_wp
-      after = reshape(matmul(jump%problem%w, reshape(jump%impulse, [size(after)])), shape(after))
-      call measure_losses(jump, after)
+      call rate_jump_solve(jump)
       if (.not. jump%is_done) return
       self%jump = matmul(response, reshape(jump%impulse, [size(jump%impulse)]))
       call mass_times(system, v, momentum)
       call velocity_mass_pick(system, momentum, self%push)
-      jump%gained = dot_product(self%push, self%jump) + 0.5_wp*sum(jump%impulse*after)
+      jump%gained = dot_product(self%push, self%jump) + 0.5_wp*sum(jump%impulse*changes(jump))
       call velocity_mass_move(self, system, 1.0_wp, v)
    end subroutine velocity_update_change
+
+   !> The impulses of a jump whose W is known, and what they take: `is_done` tells whether there are
+   !> any to take, `is_idle` that none are called for.
+   subroutine rate_jump_solve(jump)
+      type(rate_jump_t), intent(inout) :: jump
+
+      if (allocated(jump%impulse)) deallocate(jump%impulse)
+      allocate(jump%impulse(0:jump%problem%n_slip, size(jump%row)), source=0.0_wp)
+      jump%is_done = .false.
+      jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= rounded
+      if (jump%is_idle) return
+      call find_impulses(jump)
+      if (jump%is_done) call measure_losses(jump, changes(jump))
+   end subroutine rate_jump_solve
+
+   !> Impulses that obey the laws. A contact that slides on and that they would turn back is one to
+   !> stop, too: there are ever more of these.
+   subroutine find_impulses(jump)
+      type(rate_jump_t), intent(inout) :: jump   !! impulses: a start, the solution
+      type(contact_effort_t) :: effort
+      logical :: turns_back(size(jump%row))
+      integer :: k
+
+      do
+         call contact_parts_solve(jump%problem, jump%impulse, effort, jump%is_done, .true.)
+         if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
+            <= merge(nearly_stopped, nearly_met, jump%problem%n_slip > 1)
+         if (.not. jump%is_done) return
+         if (.not. allocated(jump%stopping)) exit
+         call find_turning(jump, turns_back)
+         if (.not. any(turns_back)) exit
+         do k = 1, size(turns_back)
+            if (turns_back(k)) jump%problem%free(1:, k) = jump%stopping%rate(:, k)
+         end do
+         jump%stopping%slides = jump%stopping%slides .and. .not. turns_back
+      end do
+      if (jump%problem%n_slip > 1) call obey(jump)
+      ! Pushes of the step that pull by round-off are those of the step, too.
+      if (allocated(jump%stopping)) where (jump%stopping%stays) jump%impulse = 0.0_wp
+   end subroutine find_impulses
+
+   !> Which contacts that slide on would have, at the end, a rate against their slip over the step?
+   pure subroutine find_turning(jump, turns_back)
+      type(rate_jump_t), intent(in) :: jump
+      logical, intent(out) :: turns_back(:)      !! (n)
+      real(wp), dimension(0:jump%problem%n_slip, size(jump%row)) :: change, after
+
+      change = changes(jump)
+      after = jump%rate + change
+      turns_back = jump%stopping%slides .and. &
+         sum(after(1:, :)*(jump%stopping%mean + change(1:, :)), 1) < 0.0_wp
+   end subroutine find_turning
+
+   !> What the laws are missed by is left to rates: impulses are as Coulomb's law allows.
+   pure subroutine obey(jump)
+      type(rate_jump_t), intent(inout) :: jump
+      real(wp) :: defect(0:jump%problem%n_slip, size(jump%row))
+
+      call contact_problem_map(jump%problem, jump%impulse, defect)
+      jump%impulse = jump%impulse - defect
+   end subroutine obey
+
+   !> Of rates, by the impulses [L/T].
+   pure function changes(jump) result(change)
+      type(rate_jump_t), intent(in) :: jump
+      real(wp) :: change(0:jump%problem%n_slip, size(jump%row))
+
+      change = reshape(matmul(jump%problem%w, reshape(jump%impulse, [size(change)])), shape(change))
+   end function changes
 
    !> What friction and the rest take by the impulses of a jump; it is none if the rest would give.
    pure subroutine measure_losses(jump, change)
       type(rate_jump_t), intent(inout) :: jump
       real(wp), intent(in) :: change(0:, :)      !! (0:n_slip, n) of rates by it [L/T]
-      real(wp) :: taken(size(jump%row))
+      real(wp) :: taken(size(jump%row)), mean(jump%problem%n_slip, size(jump%row)), moved
 
-      if (allocated(jump%stays)) then
-         associate (s => jump%problem%n_slip)
-            jump%rubbed = -sum(jump%impulse(1:s, :)*(jump%rate(1:s, :) + 0.5_wp*change(1:s, :)), 1)
-         end associate
-         jump%lost = -sum(jump%impulse(0, :)*(jump%rate(0, :) + 0.5_wp*change(0, :)))
-         jump%is_done = sum(jump%rubbed) >= 0.0_wp .and. jump%lost >= -met*maxval(abs( &
-            jump%problem%base) + abs(jump%impulse))*sum(abs(jump%rate) + abs(change))
-         return
-      end if
       ! Slips are by half of the size of the step, so that they are twice their mean rates.
       associate (problem => jump%problem, more => jump%impulse, s => jump%problem%n_slip)
-         taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :)) &
-            *(problem%free(1:s, :) + change(1:s, :)), 1)
+         mean = problem%free(1:s, :)
+         if (allocated(jump%stopping)) mean = jump%stopping%mean
+         taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :))*(mean + change(1:s, :)), 1)
          jump%rubbed = taken - jump%taken
          jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
+         moved = sum(abs(jump%rate) + abs(problem%free) + abs(change))
+         if (allocated(jump%stopping)) call leave_all_to_friction(jump, taken)
          ! Impulses are as exact as their problem is solved.
-         jump%is_done = jump%lost >= -met*maxval(abs(problem%base) + abs(more)) &
-            *sum(abs(jump%rate) + abs(problem%free) + abs(change))
+         jump%is_done = min(jump%lost, merge(sum(jump%taken + jump%rubbed), 0.0_wp, &
+            allocated(jump%stopping))) >= -met*maxval(abs(problem%base) + abs(more))*moved
       end associate
    end subroutine measure_losses
+
+   !> Where rates of gaps stay pushes take nothing over step and jump: what these take together is
+   !> friction's, by contacts as it is `taken` there.
+   pure subroutine leave_all_to_friction(jump, taken)
+      type(rate_jump_t), intent(inout) :: jump
+      real(wp), intent(in) :: taken(:)           !! (n) [M L^2/T^2]
+      real(wp) :: part(size(taken))
+
+      part = abs(taken)
+      if (.not. sum(part) > 0.0_wp) part = 1.0_wp
+      jump%rubbed = jump%rubbed + jump%lost/sum(part)*part
+      jump%lost = 0.0_wp
+   end subroutine leave_all_to_friction
 
    !> What impulses of 1 in gaps and slips move, such that conditions that always hold go on to
    !> hold, and W of the problem. A contact without friction has no slips to solve for.
@@ -135,7 +208,7 @@ contains
          call velocity_mass_keep(self, system, set, error, response, is_singular)
          if (allocated(error)) return
          w = matmul(transpose(row), response)
-         if (allocated(jump%stays)) call part_rows(pack(jump%stays, .true.), w)
+         if (allocated(jump%stopping)) call part_rows(pack(jump%stopping%stays, .true.), w)
          do k = 1, n
             if (set%item(jump%row(k))%has_friction) cycle
             do i = m*(k - 1) + 2, m*k

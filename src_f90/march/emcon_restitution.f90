@@ -66,7 +66,7 @@ contains
       ! Pushes change so that no gap does; where that would make energy they stay.
       do turn = 1, 2
          call find_impacts(self, impacts, jump)
-         call find_stops(self, turn == 2, jump)
+         call find_stops(self, h, turn == 2, jump)
          call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
             self%end_state%v, error)
          if (allocated(error) .or. jump%is_done .or. jump%is_idle) exit
@@ -216,32 +216,55 @@ contains
    end subroutine find_rubbing
 
    !> Friction stops what the step would turn back, by what pushes allow: its impulses take all of
-   !> the rate along the surface, or are opposite to what is left of that. Pushes stay, or change
-   !> so that rates of gaps stay.
-   pure subroutine find_stops(self, pushes_stay, jump)
+   !> the rate along the surface, or are opposite to what is left of that. Pushes change so that
+   !> rates of gaps stay, and with them the friction of all that slides on; or all of these stay.
+   pure subroutine find_stops(self, h, pushes_stay, jump)
       type(march_t), intent(in) :: self
+      real(wp), intent(in) :: h                  !! of the step, > 0 [T]
       logical, intent(in) :: pushes_stay         !! else they change
       type(rate_jump_t), intent(inout) :: jump
       integer :: k
 
-      jump%problem%free = 0.0_wp
-      jump%problem%slip_target = 0.0_wp
-      allocate(jump%stays(0:jump%problem%n_slip, size(jump%row)), source=.true.)
-      jump%stays(0, :) = pushes_stay
-      do k = 1, size(jump%row)
-         associate (law => self%active%friction%law(self%active%set%id(jump%row(k))))
-            ! What is led to its stop in the step has it.
-            if (self%active%set%item(jump%row(k))%has_friction .and. any(abs(law%slip_to_stop) &
-               > 0.0_wp) .and. .not. any(abs(law%slip_target) > 0.0_wp)) then
-               jump%stays(1:, k) = .false.
-               jump%problem%free(1:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
-            else
-               ! What slides on is at its limit, which round-off must not pass.
-               jump%problem%mu(k) = 2.0_wp*jump%problem%mu(k)
-            end if
-         end associate
-      end do
+      associate (problem => jump%problem, n => size(jump%row))
+         problem%free(0, :) = 0.0_wp
+         allocate(jump%stopping)
+         allocate(jump%stopping%stays(0:problem%n_slip, n), source=pushes_stay)
+         allocate(jump%stopping%slides(n), source=.false.)
+         jump%stopping%rate = jump%rate(1:, :)
+         jump%stopping%mean = problem%free(1:, :)
+         do k = 1, n
+            if (self%active%set%item(jump%row(k))%has_friction) call find_stop(self, h, jump, k)
+         end do
+      end associate
    end subroutine find_stops
+
+   !> The same for place `k` of the jump.
+   pure subroutine find_stop(self, h, jump, k)
+      type(march_t), intent(in) :: self
+      real(wp), intent(in) :: h
+      type(rate_jump_t), intent(inout) :: jump
+      integer, intent(in) :: k
+      logical :: is_led
+
+      associate (problem => jump%problem, stopping => jump%stopping, &
+            law => self%active%friction%law(self%active%set%id(jump%row(k))))
+         ! What is led to its stop in the step has it.
+         is_led = any(abs(law%slip_target) > 0.0_wp)
+         problem%slip_target(:, k) = 2.0_wp/h*law%slip_target(:problem%n_slip)
+         stopping%rate(:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
+         if (.not. is_led .and. (law%holds_slip() .or. any(abs(law%slip_to_stop) > 0.0_wp))) then
+            stopping%stays(1:, k) = .false.
+            problem%free(1:, k) = stopping%rate(:, k)
+         else if (stopping%stays(0, k)) then
+            ! What slides on is at its limit, which round-off must not pass.
+            problem%free(1:, k) = 0.0_wp
+            problem%slip_target(:, k) = 0.0_wp
+            problem%mu(k) = 2.0_wp*problem%mu(k)
+         else
+            stopping%slides(k) = .not. is_led
+         end if
+      end associate
+   end subroutine find_stop
 
    !> Which conditions of the set are contacts of what has mass?
    pure function has_impact(self)

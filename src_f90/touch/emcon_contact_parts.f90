@@ -17,13 +17,14 @@ module emcon_contact_parts
 contains
 
    !> Forces that obey the law at all contacts.
-   subroutine contact_parts_solve(self, push, effort, is_solved, near_enough, slope)
+   subroutine contact_parts_solve(self, push, effort, is_solved, near_enough, slope, stays_near)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) start, solution: y [M L/T^2]
       type(contact_effort_t), intent(out) :: effort  !! sum over parts
       logical, intent(out) :: is_solved              !! else `push` is as near as it came
       logical, intent(in) :: near_enough             !! as of `contact_problem_solve`
       type(contact_slope_t), intent(inout), optional :: slope    !! as there
+      logical, intent(in), optional :: stays_near    !! as there
       type(contact_problem_t) :: own
       type(contact_effort_t) :: more
       integer :: part(size(self%mu)), p, i
@@ -34,7 +35,7 @@ contains
       part = 1
       if (self%n_slip > 1 .and. any(self%mu > 0.0_wp)) call find_parts(self, part)
       if (all(part == 1)) then
-         call contact_problem_solve(self, push, effort, is_solved, near_enough, slope)
+         call contact_problem_solve(self, push, effort, is_solved, near_enough, slope, stays_near)
          return
       end if
       is_solved = .true.
@@ -42,7 +43,7 @@ contains
          contact = pack([(i, i = 1, size(part))], part == p)
          call pick(self, contact, own)
          own_push = push(:, contact)
-         call contact_problem_solve(own, own_push, more, is_own, near_enough)
+         call contact_problem_solve(own, own_push, more, is_own, near_enough, stays_near=stays_near)
          push(:, contact) = own_push
          is_solved = is_solved .and. is_own
          effort = contact_effort_t(effort%n_trial + more%n_trial, effort%n_sweep + more%n_sweep, &

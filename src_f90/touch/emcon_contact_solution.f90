@@ -10,7 +10,8 @@ module emcon_contact_solution
    use emcon_contact_problem, only : contact_effort_t, contact_problem_forces, &
       contact_problem_missed, contact_problem_motion, contact_problem_t, freely, nearly_met
    use emcon_contact_sweeps, only : contact_sweeps
-   use emcon_contact_trials, only : contact_nearing, contact_slope_t, contact_trials
+   use emcon_contact_trials, only : contact_following, contact_nearing, contact_slope_t, &
+      contact_trials
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_lemke, only : lemke_solve
@@ -28,7 +29,7 @@ module emcon_contact_solution
 contains
 
    !> Forces that obey the law at all contacts.
-   subroutine contact_problem_solve(self, push, effort, is_solved, near_enough, slope)
+   subroutine contact_problem_solve(self, push, effort, is_solved, near_enough, slope, stays_near)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) start, solution: y [M L/T^2]
       type(contact_effort_t), intent(out) :: effort
@@ -38,19 +39,30 @@ contains
       logical, intent(in), optional :: near_enough
       !> Of a problem before that is near this one, or of none yet
       type(contact_slope_t), intent(inout), optional :: slope
+      !> Where slip has a direction: forces that follow from others are to stay near the start,
+      !> however near to the law they come; or there are none
+      logical, intent(in), optional :: stays_near
       type(contact_problem_t) :: apart
-      logical :: is_one_of_several
-      integer :: turn, n_turn
+      logical :: is_one_of_several, is_bound, is_near
+      integer :: turn, n_turn, n_trial
 
+      is_bound = .false.
+      if (present(stays_near)) is_bound = stays_near
       is_one_of_several = .false.
       if (present(near_enough)) is_one_of_several = near_enough
       is_solved = size(self%mu) == 0
       if (is_solved) return
       associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp), &
             has_direction => self%n_slip > 1 .and. any(self%mu > 0.0_wp))
-         call contact_trials(self, push, merge(few_trials, first_trials, has_pushes &
-            .or. has_direction), effort%n_trial, is_solved, slope)
+         n_trial = first_trials
+         if (has_pushes .or. has_direction) n_trial = few_trials
+         call contact_trials(self, push, n_trial, effort%n_trial, is_solved, slope)
          if (is_solved .or. .not. has_compliance(self)) return
+         if (is_bound) then
+            call contact_following(self, push, effort, is_solved, is_near)
+            is_solved = is_solved .or. is_near
+            return
+         end if
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
          if (has_direction) call contact_path(self, push, effort%n_path, effort%n_trial, is_solved)

@@ -10,13 +10,17 @@ module emcon_contact_trials
    use emcon_lapack, only : dense_lu, dense_lu_solve, dense_lu_t
    implicit none
    private
-   public :: contact_slope_t, contact_trials, contact_nearing
+   public :: contact_slope_t, contact_trials, contact_following, contact_nearing
 
    !> Trials of a nearing.
    integer, parameter :: near_trials = 20
    !> Parts of W that places give way by about the forces so far, and how often.
    integer, parameter :: most_nearings = 30, few_nearings = 8
-   real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
+   real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp, less = 0.1_wp
+   !> As parts fall by so much, and by as much more each time that so few trials do: trials of each,
+   !> and the least part that is not none.
+   integer, parameter :: following_trials = 60, easy_trials = 5
+   real(wp), parameter :: least_part = 1.0e-12_wp
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -189,6 +193,72 @@ contains
       x(slope%row) = rest
    end subroutine solve_step
 
+   !> By trials of places that give way by a part of their own W about the forces at the start, ever
+   !> less of it, from where the trials before have ended: of forces that follow from others those
+   !> are found that are near the start, and ever nearer to what the law asks of them. `push` stays
+   !> as it was if nothing is found; else it obeys the law, or that with the last part.
+   subroutine contact_following(self, push, effort, is_solved, is_near)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      type(contact_effort_t), intent(inout) :: effort    !! counted on
+      logical, intent(out) :: is_solved              !! the law is met
+      logical, intent(out) :: is_near                !! or that with some part
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: start, trial
+      real(wp) :: part, next, shrink
+      integer :: n_before
+      logical :: has_ended
+
+      start = push
+      part = first_part
+      shrink = less
+      is_solved = .false.
+      do
+         trial = start
+         call try_softly(self, start, part, trial, near_trials, effort%n_trial, is_near)
+         if (is_near) exit
+         part = part/less
+         if (part > largest_part) return
+      end do
+      do
+         push = trial
+         effort%n_near = effort%n_near + 1
+         is_solved = contact_problem_missed(self, push) <= met
+         if (is_solved .or. .not. part > 0.0_wp) return
+         next = shrink*part
+         if (next < least_part) next = 0.0_wp
+         n_before = effort%n_trial
+         call try_softly(self, start, next, trial, following_trials, effort%n_trial, has_ended)
+         if (.not. has_ended) return
+         part = next
+         shrink = merge(shrink*less, less, effort%n_trial - n_before <= easy_trials)
+      end do
+   end subroutine contact_following
+
+   !> Trials of places that give way by a part of their own W about `start`.
+   subroutine try_softly(self, start, part, push, most, n_trial, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: start(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: part                   !! >= 0
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) as of `contact_trials`
+      integer, intent(in) :: most
+      integer, intent(inout) :: n_trial              !! counted on
+      logical, intent(out) :: is_solved
+      type(contact_problem_t) :: soft
+      real(wp) :: more
+      integer :: i, k, row
+
+      soft = self
+      do i = 1, size(self%mu)
+         do k = 0, self%n_slip
+            row = (1 + self%n_slip)*(i - 1) + 1 + k
+            more = part*abs(self%w(row, row))
+            soft%w(row, row) = self%w(row, row) + more
+            soft%free(k, i) = self%free(k, i) - more*start(k, i)
+         end do
+      end do
+      call contact_trials(soft, push, most, n_trial, is_solved)
+   end subroutine try_softly
+
    !> By trials of places that give way by a part of their own W about the forces so far, over and
    !> over: forces that follow from others stay as near as can be to those before. The part grows
    !> where the trials do not end, and falls where they do; where near enough will do not to what
@@ -199,35 +269,25 @@ contains
       type(contact_effort_t), intent(inout) :: effort    !! counted on
       logical, intent(in) :: near_enough             !! a few nearings do
       logical, intent(out) :: is_solved           !! the law is met
-      type(contact_problem_t) :: near
-      real(wp) :: found(0:self%n_slip, size(self%mu)), part, more, least_part
-      integer :: i, k, row, round
+      real(wp) :: found(0:self%n_slip, size(self%mu)), part, least
+      integer :: round
       logical :: has_ended
 
       is_solved = .false.
-      least_part = 0.0_wp
-      near = self
+      least = 0.0_wp
       part = first_part
       do round = 1, most_nearings
-         do i = 1, size(self%mu)
-            do k = 0, self%n_slip
-               row = (1 + self%n_slip)*(i - 1) + 1 + k
-               more = part*abs(self%w(row, row))
-               near%w(row, row) = self%w(row, row) + more
-               near%free(k, i) = self%free(k, i) - more*push(k, i)
-            end do
-         end do
          found = push
-         call contact_trials(near, found, near_trials, effort%n_trial, has_ended)
+         call try_softly(self, push, part, found, near_trials, effort%n_trial, has_ended)
          if (has_ended) then
             effort%n_near = effort%n_near + 1
             push = found
             is_solved = contact_problem_missed(self, push) <= met
             if (is_solved .or. (near_enough .and. effort%n_near == few_nearings)) return
-            part = max(least_part, 0.1_wp*part)
+            part = max(least, less*part)
          else
-            part = 10.0_wp*part
-            if (near_enough) least_part = part
+            part = part/less
+            if (near_enough) least = part
             if (part > largest_part) return
          end if
       end do

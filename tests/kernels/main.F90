@@ -32,6 +32,7 @@ program main
    use test_condition_nodes, only : collect_condition_nodes
    use test_condition_rows, only : collect_condition_rows
    use test_contact_parts, only : collect_contact_parts
+   use test_contact_following, only : collect_contact_following
    use test_contact_problem, only : collect_contact_problem
    use test_contact_rounds, only : collect_contact_rounds
    use test_constraints, only : collect_constraints
@@ -62,6 +63,7 @@ program main
    use test_energy_watch, only : collect_energy_watch
    use test_velocity_jumps, only : collect_velocity_jumps
    use test_velocity_pushes, only : collect_velocity_pushes
+   use test_stopping_jump, only : collect_stopping_jump
    use test_near_list, only : collect_near_list
    use test_common_normal, only : collect_common_normal
    use test_corner_tops, only : collect_corner_tops
@@ -374,6 +376,7 @@ program main
    call run("condition_nodes", collect_condition_nodes)
    call run("condition_rows", collect_condition_rows)
    call run("contact_parts", collect_contact_parts)
+   call run("contact_following", collect_contact_following)
    call run("contact_problem", collect_contact_problem)
    call run("contact_rounds", collect_contact_rounds)
    call run("constraints", collect_constraints)
@@ -403,6 +406,7 @@ program main
    call run("energy_watch", collect_energy_watch)
    call run("velocity_jumps", collect_velocity_jumps)
    call run("velocity_pushes", collect_velocity_pushes)
+   call run("stopping_jump", collect_stopping_jump)
    call run("near_list", collect_near_list)
    call run("common_normal", collect_common_normal)
    call run("corner_tops", collect_corner_tops)

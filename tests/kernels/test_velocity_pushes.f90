@@ -226,8 +226,11 @@ contains
       jump%row = [1, 2, 3]
       call contact_problem_create(jump%problem, 1, 3)
       allocate(jump%rate(0:1, 3), jump%taken(3), source=0.0_wp)
-      allocate(jump%stays(0:1, 3), source=.true.)
-      jump%stays(1, 2) = .false.
+      allocate(jump%stopping)
+      allocate(jump%stopping%stays(0:1, 3), source=.true.)
+      jump%stopping%stays(1, 2) = .false.
+      jump%stopping%slides = spread(.false., 1, 3)
+      allocate(jump%stopping%rate(1, 3), jump%stopping%mean(1, 3), source=0.0_wp)
       jump%rate(1, 2) = slip
       jump%problem%free(1, 2) = slip
       jump%problem%base(0, :) = [8.0_wp, 8.0_wp, pull]
@@ -236,7 +239,7 @@ contains
       if (allocated(error)) return
       call check_true(error, jump%is_done .and. abs(slip) > 1.0e-3_wp, "it is taken")
       call check_near(error, condition_rate(set%item(2), v, 1), 0.0_wp, tol, 1.0_wp, "a stop")
-      call check_near(error, pack(jump%impulse, jump%stays), spread(0.0_wp, 1, 5), 0.0_wp, 1.0_wp, &
+      call check_near(error, pack(jump%impulse, jump%stopping%stays), spread(0.0_wp, 1, 5), 0.0_wp, 1.0_wp, &
          "pushes stay")
       call check_near(error, [jump%gained, -sum(jump%rubbed)], spread(energy_of(system, v) &
          - energy_of(system, v0), 1, 2), tol, 1.0_wp, "energy")

@@ -167,6 +167,28 @@ def test_slides_to_a_stop_on_a_wall(turn: np.ndarray, tmp_path: Path) -> None:
     dissipates(run)
 
 
+@pytest.mark.parametrize(("v", "w"), [((1., 0, 0), (0, 0, 0)), ((1., .2, 0), (0, 0, 1.)), ((.2, 0, 0), (0, 0, 4.))])
+@pytest.mark.parametrize("options", ["", MORTAR])
+def test_stops_within_the_limit(options: str, v: tuple, w: tuple, tmp_path: Path) -> None:
+    """A tall rigid block: friction that stops it tips it by less than what slid, and is at each node within the limit of the
+    push that is left there, which changes in the increment of the stop."""
+    mu, one = .3, Block("C3D8", (2, 2, 2), size=(1, 1, 1.5), place=lambda x: x - np.array([.5, .5, 0]))
+    text = (bodies([one], [faces(one, 2, 0)], STIFF) + wall(plane()) + rigid(1, one, v=v, w=w)
+            + on_wall(options, f"*FRICTION\n{mu!r}\n") + f"*BOUNDARY\n{FIXED}" + dynamic(.01, .5, weight()))
+    run = ran(tmp_path, text.replace("U\n*END", "U\n*CONTACT FILE\nCSTRESS, CSHEAR\n*END"))
+    fields, low = run.fields(), np.array(one.on(2, 0)) - 1
+    push, drag = fields["contact_pressure"][1:, low], np.linalg.norm(fields["contact_shear"][1:, low], axis=-1)
+    assert push.min() > -1e-10*push.max()
+    assert (drag - mu*push).max() < 1e-12*push.max()
+    assert np.ptp(push[5], axis=0) > .2*push.mean()
+    # All goes by friction, but what holds the rates of a rigid body as it stops: a power of its turn in an increment.
+    start = run.history["kinetic"][0]
+    assert run.history["kinetic"][-1] < 1e-24*start
+    assert run.history["restitution_loss"][-1] < (.01*np.linalg.norm(w))**4*start + 1e-24
+    assert abs(run.history["friction_loss"][-1] + run.history["restitution_loss"][-1] - start) < 1e-11*start
+    dissipates(run)
+
+
 @pytest.mark.parametrize("is_rigid", [True, False])
 def test_thrown_with_a_spin_on_a_wall(is_rigid: bool, tmp_path: Path) -> None:
     run = ran(tmp_path, on_plane(.3, .5, (1., .2, 0), is_rigid=is_rigid, w=(0, 0, 1.)))
