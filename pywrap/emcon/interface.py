@@ -43,16 +43,16 @@ from .arguments import flag_array, number, real_array
 from .csr import Csr
 from .errors import _KINDS, AnalysisError, InputError
 from .given_matrices import as_csr, check_csr
+from .host_newton import HostNewton, Respond, Solve
 from .memory import copied, csr, made, matrix, matrix_bytes, structure, structures, text, whole
 from .options import host_choices
+from .outer_faces import outer_faces
 
-__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome", "Slips"]
+__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome", "Slips",
+           "outer_faces"]
 
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
-
-_EPSILON = float(np.finfo(float).eps)
-_MOST_ITERATES = 40
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -130,6 +130,11 @@ class Slips:
     slip: Floats        #: (n_contact, n_dim - 1) [L]
     friction: Floats    #: (n_contact, n_dim - 1), against the slip [M L/T^2]
 
+    @property
+    def loss(self) -> float:
+        """The energy that friction has taken in the step."""
+        return float((self.friction*self.slip).sum())
+
 
 @dataclass(frozen=True)
 class NullSpace:
@@ -199,6 +204,9 @@ class Interface:
         self.n_contact = 0      #: contacts possible, known after `prepare`
         self.n_unknown = 0      #: freedoms neither held nor tied to others, known after `prepare`
         self._n_surface = self._n_tie = 0
+        self._held: Flags = np.zeros((0, 0), bool)
+        self._map: Csr | None = None
+        self._has_candidates = False
         self._n_row = 0         # rows of ties, which the library counts before contacts
         self._x = x
         self._handle = _core.emcon_new(x)[1]
@@ -258,7 +266,7 @@ class Interface:
         `faces`: nodes of faces, (k, m) integers, one such array for each kind that the surface has:
         m is 3, 4, or with a node in the middle of each side 6, 8; in the plane 2, edges. Corners
         come first, counter-clockwise as seen from outside the body, then the nodes between a corner
-        and the next. Raises `InputError` as `add_surface`.
+        and the next: `outer_faces` finds them for cells. Raises `InputError` as `add_surface`.
         """
         if not isinstance(name, str) or "\0" in name:
             raise InputError(f"name is {name!r}, not a text")
@@ -363,6 +371,7 @@ class Interface:
         if held is None:
             held = np.zeros((self.n_node, self.n_dim), bool)
         flags = flag_array(held, "held", (self.n_node, self.n_dim))
+        self._held = flags.astype(bool)
         self._call(_core.emcon_hold, flags)
         self._call(_core.emcon_build)
         sizes = self._sizes()
@@ -451,6 +460,7 @@ class Interface:
         own = as_csr(map, n, "map", shape[1])
         check_csr(own, "map")
         self._call(_core.emcon_set_map, matrix_bytes(own))
+        self._map = own
 
     # ---- a step from the displacements u0 by du, (n_node, n_dim) each [L] ------------------------
 
@@ -497,50 +507,23 @@ class Interface:
             raise AnalysisError(f"the step cannot be ended with these contacts: {outcome.name}")
         return motion, lam, active
 
-    def newton(self, u0: ArrayLike, respond: Callable[[Floats], tuple[Any, Any]],
-               free: ArrayLike | None = None) -> Callable[[Floats, int], tuple[Floats, Floats]]:
-        """Newton's method for `solve_step(..., together=True)`, of a residual and a tangent.
+    def newton(self, u0: ArrayLike, respond: Respond, free: ArrayLike | None = None,
+               solve: Solve | None = None) -> Callable[[Floats, int], tuple[Floats, ...]]:
+        """Newton's method for `solve_step`, of a residual and a tangent.
 
         `respond(du)` gives the residual of the step without contact, a field, and its derivative by
-        du, an array or a sparse matrix of scipy over the freedoms of the nodes; `free`: the numbers
-        of those that are solved for, None: all. In each iterate the equations are condensed to the
-        rows of contact. It ends where the motion is round-off of the positions, or no more grows
-        less. Raises `AnalysisError` where it does not.
+        du, an array or a sparse matrix of scipy; after `set_map` both are by the unknowns w. It may
+        give a third result, the `magnitude` of `update_active`. `free`: the numbers of the freedoms
+        that are solved for; None: all that are neither held nor tied. `solve(matrix, right)`: your
+        linear solver, matrix^-1 times the columns of `right`; None: LAPACK or SuperLU.
+
+        What damping pushes is added. In each iterate the equations are condensed to the rows of
+        contact with `together=True`, otherwise to the null space of the selected contacts, which
+        takes neither `free` nor a map. It ends where the motion is round-off of the positions, or
+        does not decrease any more. Raises `AnalysisError` where it does not converge, and where
+        selected contacts follow from others.
         """
-        own = np.arange(self.n_node*self.n_dim) if free is None else np.asarray(free)
-        reach = float(np.abs(self._x).max())
-
-        def solve(du: Floats, n: int) -> tuple[Floats, Floats]:
-            lam, last = np.zeros(n), np.inf
-            for _ in range(_MOST_ITERATES):
-                residual, tangent = respond(du)
-                motion, lam = self._correct(u0, du, lam, np.asarray(residual).ravel(), tangent, own)
-                du.ravel()[own] += motion
-                size = float(np.abs(motion).max(initial=0.0))
-                if size <= 4*_EPSILON*reach or last <= size < 1e-10*reach:
-                    return du, lam
-                last = size
-            raise AnalysisError(f"Newton's method still moves by {size:g}: try a smaller step")
-
-        return solve
-
-    def _correct(self, u0: ArrayLike, du: Floats, lam: Floats, residual: Floats, tangent: Any,
-                 free: Any) -> tuple[Floats, Floats]:
-        """The motion of the free freedoms, and the multipliers that obey the laws of contact."""
-        rows = self.evaluate(u0, du)
-        g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
-        second = self.curvature(lam)
-        right = np.column_stack([g.T, residual[free]])
-        if isinstance(tangent, np.ndarray):
-            solved = np.linalg.solve((tangent - second.toarray())[np.ix_(free, free)], right)
-        else:
-            from scipy.sparse import csc_array
-            from scipy.sparse.linalg import splu
-            solved = splu(csc_array(tangent - second.to_scipy())[free][:, free]).solve(right)
-        by_lam, alone = solved[:, :-1], solved[:, -1]
-        if len(lam):
-            lam = self.solve_contacts(c @ by_lam, rows.defect - c @ alone)
-        return by_lam @ lam - alone, lam
+        return HostNewton(self, np.array(self._field("u0", u0)), respond, free, solve).solve
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
@@ -554,6 +537,7 @@ class Interface:
     def select(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
         """Select the contacts `active`, (n_contact,) booleans; return how many rows they have."""
         flags = self._flags("active", active)
+        self._has_candidates = False
         return self._call(_core.emcon_select, *self._motion(u0, du), flags)
 
     @_exclusive()
@@ -565,6 +549,7 @@ class Interface:
         lets go those that do not push once the step is solved.
         """
         flags = self._flags("active", active)
+        self._has_candidates = True
         return self._call(_core.emcon_select_candidates, *self._motion(u0, du), flags)
 
     @_exclusive()

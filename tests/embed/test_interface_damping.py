@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from interface_solid import Floats, Host, collision
+from interface_solid import Floats, collision
 from test_interface_solid import H, N_STEP, own_model
 from test_interface_space import over_the_floor
 
@@ -15,44 +15,9 @@ from emcon.interface import InputError, Interface
 DAMPING = {"damping": (20.0, 0.04, 0.3)}
 
 
-class Damped(Host):
-    """The host whose contact is damped, too."""
-
-    def step(self, h: float) -> None:
-        self.taken = 0.0
-        du, _, self.active = self.face.solve_step(
-            self.u, h*self.v, self.active, lambda du, n: self.solve(h, du, np.zeros(n)), stop=0.5*h*self.v, h=h, together=True)
-        slips = self.face.slips()
-        self.lost += float((slips.friction*slips.slip).sum()) + self.taken
-        self.n_status += np.bincount(slips.status, minlength=3)
-        self.u, self.v = self.u + du, 2/h*du - self.v
-
-    def solve(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
-        free, last = self.free, np.inf
-        for _ in range(40):
-            force, tangent = self.solid.respond(self.u, du)
-            rows = self.face.evaluate(self.u, du)
-            damping, self.taken = self.face.law_forces()
-            g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
-            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force - damping.ravel())[free]
-            tangent += 2/h**2*self.solid.mass - self.face.curvature(lam).toarray()
-            solved = np.linalg.solve(tangent[np.ix_(free, free)], np.column_stack([g.T, residual]))
-            by_lam, alone = solved[:, :-1], solved[:, -1]
-            if len(lam):
-                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)
-            motion = by_lam @ lam - alone
-            du.ravel()[free] += motion
-            size = np.abs(motion).max()
-            if size <= 1e-15 or last <= size < 1e-11:
-                return du, lam
-            last = size
-        raise ArithmeticError(f"Newton's method still moves by {size:g}")
-
-
 @pytest.mark.parametrize(("kind", "friction"), [("node to segment", 0.0), ("node to segment", 0.4), ("mortar", 0.0), ("mortar", 0.3)])
 def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float) -> None:
-    host = Damped.__new__(Damped)
-    vars(host).update(vars(collision(kind, friction, **DAMPING)))
+    host = collision(kind, friction, **DAMPING)
     start = host.energy()
     model = own_model(host, kind, friction, itself=False, **DAMPING)
     with Stepper(model) as program:
