@@ -28,8 +28,8 @@ contains
       n_before = reader%log%n_errors
       damping = contact_damping_t()
       call option_word(reader, card, "DEFINITION", "DAMPING COEFFICIENT", word, &
-         "CRITICAL DAMPING FRACTION", "what is critical is by a contact stiffness, and " // &
-         "contact that is held exactly has none")
+         "CRITICAL DAMPING FRACTION", "critical damping is a fraction of a contact " // &
+         "stiffness, and exact contact has none")
       call option_number(reader, card, "TANGENT FRACTION", "a number of 0 or more: the " // &
          "coefficient along the surface by that normal to it", 0.0_wp, huge(1.0_wp), &
          damping%tangent)
@@ -93,12 +93,12 @@ contains
             cycle
          end if
          if (any(step_initiation(step) == initiation_massless)) call &
-            warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
-            "PERSISTENT does")
+            warn(pair(i), "needs nodes with mass: both surfaces keep theirs, and gaps are " // &
+            "held as by PERSISTENT")
          if (pair(i)%interaction%damping%clearance > 0.0_wp &
             .or. pair(i)%interaction%damping%tangent > 0.0_wp) cycle
          if (.not. any(step%contact%method == method_penalty)) call warn(pair(i), &
-            "damps nothing: what contact holds exactly does not move along its normal; give a " // &
+            "damps nothing: nodes in exact contact do not move along its normal; give a " // &
             "clearance or a TANGENT FRACTION")
       end do
 

@@ -17,7 +17,7 @@ EPS = 2.0**-52
 HALF_MADE = [
     "deck is NULL", "no scene", "no scene", "typed:2: error: .*nowhere", "no scene",
     "", "free to move", "no scene", "no scene", "", "", "not built yet", "not built yet", "", "",
-    "path is NULL", "no scene", "has no seal",
+    "path is NULL", "no scene", "has no checksum",
     "state.h5 does not exist",
 ]
 WITHOUT_ARRAYS = [""]*10 + [
@@ -36,7 +36,7 @@ RUBBISH = [
     "u1 is not finite", "u0 is not finite",
 ]
 # Codes other than 2.
-CODES = {"": 0, "free to move": 3, "has no seal": 4, "state.h5 does not exist": 4,
+CODES = {"": 0, "free to move": 3, "has no checksum": 4, "state.h5 does not exist": 4,
          "cannot create no/such/folder": 4}
 
 

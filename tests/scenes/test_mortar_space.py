@@ -138,7 +138,7 @@ def test_unlike_faces_land_flat(options: str, cells: int, tmp_path: Path) -> Non
     history = run.history
     assert run.verdict["verdict"] == "good"
     assert history["cuts"].sum() == 0
-    assert "take their mass back" not in run.log
+    assert "get their mass back" not in run.log
     assert history["active"].max() >= (cells + 1)**2
     assert history["active"][-1] == 0
     for name in ("px", "py", "pz", "lx", "ly", "lz"):

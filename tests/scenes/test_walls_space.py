@@ -424,12 +424,12 @@ def test_fillets(tmp_path: Path) -> None:
         way.append(ran(folder, text).fields()["displacement"][-1])
     assert np.abs(way[1] - way[0]).max() <= 1e-12*np.abs(way[0]).max()
     bowl = "TYPE=REVOLUTION, FILLET RADIUS=.5\n0, 0, -.06, 0, 0, 1\nSTART, 0., 0.\nLINE, 3., 0.\nLINE, 3., 2.\n"
-    assert "hollow corner" in refusal(tmp_path, falling(cube(), bowl.replace(", FILLET RADIUS=.5", ""), (0., 0., -1.)))
+    assert "concave corner" in refusal(tmp_path, falling(cube(), bowl.replace(", FILLET RADIUS=.5", ""), (0., 0., -1.)))
     check_balance(ran(tmp_path, falling(cube(), bowl, (0., 0., -1.))))
 
 
 @pytest.mark.parametrize(("shape", "said"), [
-    ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, 1., 2.\nLINE, 1., 0.\nLINE, 3., 0.\n", "hollow corner at 1, 0"),
+    ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, 1., 2.\nLINE, 1., 0.\nLINE, 3., 0.\n", "concave corner at 1, 0"),
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, -1., 2.\nLINE, 1., 0.\n", "radii below 0"),
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 0\nSTART, 1., 2.\nLINE, 1., 0.\n", "a and b are the same"),
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\n", "a profile begins with START"),
