@@ -109,8 +109,7 @@ contains
          if (.not. sum(area) > 0.0_wp) then
             call refuse(scene, step, system%contact(k)%of_pair, "a slave surface " // &
                "made of nodes has no area, which penalties need; name its elements and faces, " // &
-               "or " // &
-               "use hard contact", error)
+               "or use hard contact", error)
             return
          end if
          self%area(before + 1:before + size(area)) = area*contact%area_factor

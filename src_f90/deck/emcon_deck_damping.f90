@@ -69,8 +69,7 @@ contains
             k = findloc(step_initiation(scene%step), initiation_massless, 1)
             if (k > 0) call refuse("step " // to_text(k) // " has *CONTACT INITIATION, " // &
                "TYPE=MASSLESS: forces of damping are left out of the balance of nodes without " // &
-               "mass; use " // &
-               "PERSISTENT")
+               "mass; use PERSISTENT")
          end associate
       end do
 

@@ -193,8 +193,7 @@ contains
             to_text(self%contact_kept, 3) // ", " // to_text(self%contact_kept/largest, 3) // &
             " of the largest, as nodes inside a surface have left it at an end or a corner; " // &
             "in the plane TYPE=NODE TO SURFACE of *CONTACT PAIR follows them; TYPE=NULL SPACE " // &
-            "of " // &
-            "*CONSTRAINT METHOD stores no energy")
+            "of *CONSTRAINT METHOD stores no energy")
          if (self%has_explicit .and. self%contact_taken > most_loss*largest + rounding) then
             call taken_text(self, text)
             call note_add(reasons, text // " as explicit steps stop what touches: a finer mesh " &

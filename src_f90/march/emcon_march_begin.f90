@@ -259,9 +259,8 @@ contains
       associate (pair => scene%pair(i))
          associate (names => scene%surface(pair%slave)%name // " and " // &
                scene%surface(pair%master)%name)
-            call note_add(self%system%notes, "surfaces " // names // ": for " // &
-               "*CONTACT INTERFERENCE gaps are measured between the curves through the nodes, " // &
-               "not " // &
+            call note_add(self%system%notes, "surfaces " // names // ": gaps are " // &
+               "measured between the curves through the nodes, for *CONTACT INTERFERENCE, not " // &
                "between straight edges: that changes them by up to " // to_text(change, 3) // &
                ", and the interference is " // to_text(interference, 3))
             doubt = self%system%contact(i)%contact%curve_doubt()
@@ -449,8 +448,7 @@ contains
          if (.not. step_is_dynamic(step) .or. .not. step%time%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
          call raise(error, err_input, where_text(scene, step%time%tolerance_origin) &
-            // ": error: " // &
-            "TOLERANCE= needs a scheme that tells its error, and this one does not")
+            // ": error: TOLERANCE= needs a scheme that tells its error, and this one does not")
       end associate
    end subroutine check_tolerance
 

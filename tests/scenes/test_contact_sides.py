@@ -114,7 +114,7 @@ def test_bodies_of_a_deck_without_contact_are_looked_at(tmp_path, cells):
         deck.remove(card)
     run = run_deck(deck, tmp_path, code=3)
     assert run.verdict["penetration"] >= 0.39 and run.history["penetration"][-1] >= 0.39
-    assert "name them in a *CONTACT PAIR" in run.verdict["reasons"][0]
+    assert "names the two; add one, or name all by *CONTACT" in run.verdict["reasons"][0]
 
 
 def test_decks_made_anew():
