@@ -1,6 +1,5 @@
 !> *CONTACT DAMPING of surface interactions, and what it does not go with.
 module emcon_deck_contact_damping
-   use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, option_number, option_word, reader_t
    use emcon_diagnostics, only : add_error, add_warning
@@ -33,8 +32,6 @@ contains
       call option_number(reader, card, "TANGENT FRACTION", "a number of 0 or more: the " // &
          "coefficient along the surface by that normal to it", 0.0_wp, huge(1.0_wp), &
          damping%tangent)
-      if (reader%n_dim == n_space .and. damping%tangent > 0.0_wp) call card_error(reader, card, &
-         "TANGENT FRACTION: damping along surfaces in three dimensions is not in this version")
       call data_open(data, card)
       n = 0
       do while (next_line(reader, data))

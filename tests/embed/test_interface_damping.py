@@ -15,11 +15,12 @@ from emcon.interface import InputError, Interface
 DAMPING = {"damping": (20.0, 0.04, 0.3)}
 
 
+@pytest.mark.parametrize("along", [{}, {"tangent_fraction": 0.5}])
 @pytest.mark.parametrize(("kind", "friction"), [("node to segment", 0.0), ("node to segment", 0.4), ("mortar", 0.0), ("mortar", 0.3)])
-def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float) -> None:
-    host = collision(kind, friction, **DAMPING)
+def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float, along: dict[str, float]) -> None:
+    host = collision(kind, friction, **DAMPING, **along)
     start = host.energy()
-    model = own_model(host, kind, friction, itself=False, **DAMPING)
+    model = own_model(host, kind, friction, itself=False, **DAMPING, **along)
     with Stepper(model) as program:
         for _ in range(N_STEP):
             program.step(H)
@@ -32,9 +33,10 @@ def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float
         assert host.lost == pytest.approx(program.ledger["friction_loss"] + taken, abs=1e-13)
 
 
+@pytest.mark.parametrize("fraction", [0.0, 0.6])
 @pytest.mark.parametrize("kind", ["node to segment", "mortar"])
-def test_the_derivative_of_damping_is_in_the_curvature(kind: str) -> None:
-    face, _ = over_the_floor(kind=kind, **DAMPING)
+def test_the_derivative_of_damping_is_in_the_curvature(kind: str, fraction: float) -> None:
+    face, _ = over_the_floor(kind=kind, **DAMPING, tangent_fraction=fraction)
     random = np.random.default_rng(8)
     u0, du, way = 0.01*random.standard_normal((3, face.n_node, 3))
     active = face.begin_step(u0, du, np.zeros(face.n_contact, bool), h=0.01)
@@ -49,6 +51,11 @@ def test_the_derivative_of_damping_is_in_the_curvature(kind: str) -> None:
     size = np.finfo(float).eps**(1/3)
     difference = (force(size) - force(-size))/(2*size)
     assert np.abs(slope - difference).max() < 1e-7*np.abs(slope).max()
+    for way in 0.02*random.standard_normal((5, face.n_node, 3)):
+        face.select(u0, way, face.begin_step(u0, way, np.zeros(face.n_contact, bool), h=0.01))
+        face.evaluate(u0, way)
+        push, taken = face.law_forces()
+        assert taken >= 0 and taken == pytest.approx(-(push*way).sum(), abs=1e-13*np.abs(push).sum())
 
 
 def test_a_rigid_mass_keeps_its_law() -> None:
@@ -107,9 +114,7 @@ def test_damping_needs_the_size_of_the_step() -> None:
         face.evaluate(u, u)
     with pytest.raises(InputError, match="h is 0"):
         face.begin_step(u, u, active, h=0.0)
-    for wrong, said in ((-1.0, "damping is -1, below 0"), ((1, 0, 2), "the flat part of damping is 2"), ((), "one to three numbers"),
-                        (0.0, "in three dimensions is not in this version")):
+    for wrong, said in ((-1.0, "damping is -1, below 0"), ((1, 0, 2), "the flat part of damping is 2"), ((), "one to three numbers")):
         other = Interface(face.positions)
         with pytest.raises(InputError, match=said):
-            other.add_pair(other.add_faces("a", [[0, 1, 4]]), other.add_faces("b", [[2, 3, 6]]), damping=wrong,
-                           tangent_fraction=float(wrong == 0.0))
+            other.add_pair(other.add_faces("a", [[0, 1, 4]]), other.add_faces("b", [[2, 3, 6]]), damping=wrong)
