@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -149,4 +150,6 @@ def test_header_is_clean(language: str, tmp_path: Path) -> None:
     compiler, ending = ("c++", "cpp") if "++" in language else ("cc", "c")
     need(compiler)
     (tmp_path/f"header.{ending}").write_text("#include <emcon.h>\n#include <emcon.h>\n")
-    run(compiler, *WARNINGS, language, f"-I{API}", "-fsyntax-only", tmp_path/f"header.{ending}")
+    command = [compiler, *WARNINGS, language, f"-I{API}", "-fsyntax-only", tmp_path/f"header.{ending}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
