@@ -73,10 +73,10 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Gaps:
-    """Where all possible contacts stand at both ends of a step, (n_contact,) each.
+    """Gaps of all possible contacts at both ends of a step, (n_contact,) each.
 
     `start`, `end`: gaps, > 0 open [L], of mortar contact weighted means; meaningless where
-    `is_near` is False: there is no surface within reach. `is_over`: not past the surface's end.
+    `is_near` is False: no surface is within reach. `is_over`: not past the end of the surface.
     `edge`: length of an edge, to which tolerances relate [L].
     """
 
@@ -120,7 +120,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class Slips:
-    """How all possible contacts hold along the surface in the step that was solved last.
+    """Status, slip and friction of all possible contacts in the step that was solved last.
 
     `status`: 0 open, 1 acts and does not slide, 2 slides. Slips and friction are vectors along the
     surface, (n_contact, n_dim - 1); friction times slip is what the step has lost, never below 0.
@@ -348,7 +348,7 @@ class Interface:
     @_exclusive(None)
     def configure(self, *, initiation: str = "persistent", gap_tolerance: float = 0.0,
                   is_last_try: bool = False, is_end: bool = False) -> None:
-        """Settings, also between steps; those not named are the defaults again.
+        """Set options, also between steps; options that are not named get their defaults again.
 
         `initiation`: "persistent" contact holds the gap that its first step began with, which keeps
         energy, "admissible" closes it. `gap_tolerance`: no contact begins with a larger gap per
@@ -362,7 +362,7 @@ class Interface:
 
     @_exclusive(False)
     def prepare(self, held: ArrayLike | None = None) -> Floats:
-        """Finish; from here on there are steps. Returns the positions, (n_node, n_dim) [L].
+        """End the definition; after this, steps can begin. Returns positions, (n_node, n_dim) [L].
 
         `held`: freedoms that the host moves by itself, (n_node, n_dim) booleans; None: none. Slave
         nodes of ties are moved onto their masters: the host takes over the positions. After an
@@ -433,11 +433,11 @@ class Interface:
         return matrix(self._call(_core.emcon_links))
 
     def follow(self, field: ArrayLike) -> Floats:
-        """A displacement or velocity, (n_node, n_dim), whose tied freedoms follow the others."""
+        """A displacement or velocity, (n_node, n_dim), with tied nodes moved as the ties say."""
         return self._changed(_core.emcon_follow, field)
 
     def gather(self, field: ArrayLike) -> Floats:
-        """Forces, (n_node, n_dim); those on tied freedoms went to the ones that they follow."""
+        """Forces, (n_node, n_dim), those on tied nodes moved to the nodes that these depend on."""
         return self._changed(_core.emcon_gather, field)
 
     @_exclusive()
@@ -446,7 +446,7 @@ class Interface:
 
     @_exclusive()
     def set_map(self, map: Any) -> None:
-        """Unknowns w of the host's from here on: u = A w + what does not change.
+        """From now on the unknowns are w of the host, with u = A w + a constant.
 
         `map`: A, (n_dim n_node, any), a sparse matrix of scipy, a `Csr` or an array, for points of
         faces of higher order, hanging nodes, rigid bodies or control points. Rows of gradients, and
@@ -467,7 +467,7 @@ class Interface:
     @_exclusive()
     def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
                    stop: ArrayLike | None = None, h: float | None = None) -> Flags:
-        """Begin a step with the motion `du` that is expected.
+        """Begin a step; `du` is the motion that you expect.
 
         `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
         Returns those that still can. `stop`, where pairs have friction: the motion with which all
@@ -566,7 +566,7 @@ class Interface:
 
     @_exclusive()
     def pattern(self, u0: ArrayLike, du: ArrayLike) -> Csr:
-        """What contact may couple in the step that was begun, before it is solved.
+        """Which degrees of freedom contact may couple in this step, known before it is solved.
 
         Values of 1, n_dim n_node each way, or by the unknowns of `set_map`, over all contacts that
         have a surface near, whether they act, stick or slide: `curvature`, and products of rows of
@@ -627,13 +627,13 @@ class Interface:
 
     @_exclusive()
     def slips(self) -> Slips:
-        """How contacts stick and slide, by the multipliers that `update_active` was given."""
+        """Status, slip and friction of all contacts, by the multipliers of `update_active`."""
         status, slip, friction = self._call(_core.emcon_get_slips, self.n_contact + self._n_row)
         return Slips(status[self._n_row:], slip[self._n_row:], friction[self._n_row:])
 
     @_exclusive()
     def law_forces(self) -> tuple[Floats, float]:
-        """What damping pushes at the nodes in the step evaluated last, and the energy it takes.
+        """Damping forces at the nodes in the last evaluated step, and the energy that they take.
 
         Forces, (n_node, n_dim), to be added to those of contact; their derivative is in
         `curvature`. The energy is >= 0.
