@@ -367,8 +367,8 @@ public:
 
    // A step from the displacements `u0`, solved with all candidates until none is missing. Before,
    // `du` is the expected motion, and `active` has the flags of the step before (empty: nothing acted);
-   // after it, those of this one. `newton(du, n)` solves with the n rows that are selected: it changes du, and returns
-   // their multipliers. `stop` is that of emcon_begin_friction; empty: none.
+   // after it, those of this one. `newton(du, n)` solves with the n rows that are selected: it changes
+   // du, and returns their multipliers. `stop` is that of emcon_begin_friction; empty: none.
    template <class Newton>
    void solve_step(const std::vector<double> &u0, std::vector<double> &du, std::vector<int> &active,
                    const std::vector<double> &stop, Newton newton)
@@ -395,10 +395,10 @@ public:
    // the residual r of the motion du without contact and its derivative K, which gets minus `second`;
    // it adds r to the last of the n columns, one after the other, and puts K^-1 times each in its
    // place. There are as many rows as unknowns. It ends where the motion is round-off of the
-   // positions, or does not decrease any more. Both arguments have to outlive what is returned.
+   // positions, or does not decrease any more. The model and `u0` have to outlive what is returned.
    template <class Solve>
-   std::function<std::vector<double>(std::vector<double> &, int)> newton(const std::vector<double> &u0,
-                                                                         Solve solve)
+   std::function<std::vector<double>(std::vector<double> &, int)> newton(
+      const std::vector<double> &u0, Solve solve)
    {
       if (owned_->map.start.empty())
          throw InputError(EMCON_ERROR_INPUT, "newton is called before set_map or set_free_unknowns");
