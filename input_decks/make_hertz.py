@@ -8,6 +8,7 @@ The level is the number of elements over the half-width of the contact.
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Callable
 
@@ -160,13 +161,30 @@ def axis_nodes(grid: Grid, arc: int) -> list[int]:
     return [label for label in middle if label != middle[arc]]
 
 
-def main() -> None:
-    parser = arguments(__doc__)
+def pressed_sets(lower: Grid, upper: Grid, upper_arc: str, lower_arc: str) -> list[str]:
+    """Sets and surfaces of a body whose last row meets the first row of one above it."""
+    return (set_lines("NSET", "BASE", [column[0] for column in lower.node])
+            + set_lines("NSET", "HEAD", [column[-1] for column in upper.node])
+            + set_lines("NSET", "AXIS", axis_nodes(lower, -1))
+            + set_lines("NSET", "AXIS", axis_nodes(upper, 0))
+            + set_lines("ELSET", "HEAD", [column[-1] for column in upper.element])
+            + surface_lines(upper_arc, "S1", [column[0] for column in upper.element])
+            + surface_lines(lower_arc, "S3", [column[-1] for column in lower.element]))
+
+
+def level_options(purpose: str | None) -> argparse.Namespace:
+    """Those of the command line: where the deck goes, and how fine it is."""
+    parser = arguments(purpose)
     parser.add_argument("--level", type=int, default=6, metavar="N",
                         help="elements over the half-width of the contact (default 6)")
     options = parser.parse_args()
     if options.level < 1:
         parser.error("--level: at least 1")
+    return options
+
+
+def main() -> None:
+    options = level_options(__doc__)
     fine = HALF_WIDTH/options.level
 
     upper_cells, upper_place = half_cylinder(fine)
@@ -187,13 +205,7 @@ def main() -> None:
     lines += lower.node_lines() + lower.element_lines()
     lines += comment("Upper cylinder, likewise") + upper.node_lines() + upper.element_lines()
     lines += comment("Sets and surfaces")
-    lines += set_lines("NSET", "BASE", [column[0] for column in lower_grid.node])
-    lines += set_lines("NSET", "HEAD", [column[-1] for column in upper_grid.node])
-    lines += set_lines("NSET", "AXIS", axis_nodes(lower_grid, -1))
-    lines += set_lines("NSET", "AXIS", axis_nodes(upper_grid, 0))
-    lines += set_lines("ELSET", "HEAD", [column[-1] for column in upper_grid.element])
-    lines += surface_lines("UPPER_ARC", "S1", [column[0] for column in upper_grid.element])
-    lines += surface_lines("LOWER_ARC", "S3", [column[-1] for column in lower_grid.element])
+    lines += pressed_sets(lower_grid, upper_grid, "UPPER_ARC", "LOWER_ARC")
     lines += comment("Material, contact") + MATERIAL.strip().splitlines()
     lines += comment("Step 1: close the contact") + STEP_CLOSE.strip().splitlines()
     lines += comment("Step 2: the pressure in place of the displacement")

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 
-from deckwriter import (Grid, Part, Point, add_grid, arguments, comment, heading, number,
-                        set_lines, surface_lines, write_deck)
-from make_hertz import axis_nodes, graded, half_cylinder
+from deckwriter import Grid, Part, Point, add_grid, comment, heading, number, write_deck
+from make_hertz import graded, half_cylinder, level_options, pressed_sets
 from scenery import CONTACT_CARDS, contact_parameters
 
 RADIUS, BLOCK = 50.0, 200.0
@@ -122,12 +121,7 @@ def add_block(part: Part, fine: float) -> Grid:
 
 
 def main() -> None:
-    parser = arguments(__doc__)
-    parser.add_argument("--level", type=int, default=6, metavar="N",
-                        help="elements over the half-width of the contact (default 6)")
-    options = parser.parse_args()
-    if options.level < 1:
-        parser.error("--level: at least 1")
+    options = level_options(__doc__)
     fine = HALF_WIDTH/options.level
 
     block, cylinder = Part("BLOCK"), Part("CYLINDER")
@@ -141,13 +135,7 @@ def main() -> None:
     lines += block.node_lines() + block.element_lines()
     lines += comment("Cylinder, likewise") + cylinder.node_lines() + cylinder.element_lines()
     lines += comment("Sets and surfaces")
-    lines += set_lines("NSET", "BASE", [column[0] for column in block_grid.node])
-    lines += set_lines("NSET", "HEAD", [column[-1] for column in cylinder_grid.node])
-    lines += set_lines("NSET", "AXIS", axis_nodes(block_grid, -1))
-    lines += set_lines("NSET", "AXIS", axis_nodes(cylinder_grid, 0))
-    lines += set_lines("ELSET", "HEAD", [column[-1] for column in cylinder_grid.element])
-    lines += surface_lines("ARC", "S1", [column[0] for column in cylinder_grid.element])
-    lines += surface_lines("TOP", "S3", [column[-1] for column in block_grid.element])
+    lines += pressed_sets(block_grid, cylinder_grid, "ARC", "TOP")
     lines += comment("Materials, contact") + MODEL.strip().splitlines()
     lines += comment("Close the contact, then the pressure in place of the displacement")
     lines += STEPS.strip().splitlines()

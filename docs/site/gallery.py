@@ -20,7 +20,7 @@ PROGRAM = ROOT/"build"/"release"/"emcon"
 
 #: Decks by what they show; those that are not named stand last.
 CHAPTERS = {
-    "Parts of machines": "snap_fit seal press_fit roller pressed_ball linked_rings",
+    "Parts of machines": "snap_fit seal wheel press_fit roller pressed_ball linked_rings",
     "Impacts": "ring two_bodies three_bodies self_contact bouncing_bar bar_on_wall rigid_bar "
                "bouncing_ball ball_in_bowl thrown_ring caught_ring hertz_ball",
     "Friction": "sliding_block dominoes",
@@ -29,7 +29,8 @@ CHAPTERS = {
     "Bodies alone": "spinning_ring tumbling_block cantilever",
 }
 #: Decks of which a second picture shows another field.
-FIELDS = {"sliding_block": "contact_shear", "hertz": "contact_pressure", "seal": "contact_pressure"}
+FIELDS = {"sliding_block": "contact_shear", "hertz": "contact_pressure", "seal": "contact_pressure",
+          "wheel": "contact_shear"}
 #: Rows of a block of data that are shown.
 SHOWN_ROWS = 4
 

@@ -43,16 +43,16 @@ from .arguments import flag_array, number, real_array
 from .csr import Csr
 from .errors import _KINDS, AnalysisError, InputError
 from .given_matrices import as_csr, check_csr
+from .host_newton import HostNewton, Respond, Solve
 from .memory import copied, csr, made, matrix, matrix_bytes, structure, structures, text, whole
 from .options import host_choices
+from .outer_faces import outer_faces
 
-__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome", "Slips"]
+__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome", "Slips",
+           "outer_faces"]
 
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
-
-_EPSILON = float(np.finfo(float).eps)
-_MOST_ITERATES = 40
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -73,10 +73,10 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Gaps:
-    """Where all possible contacts stand at both ends of a step, (n_contact,) each.
+    """Gaps of all possible contacts at both ends of a step, (n_contact,) each.
 
     `start`, `end`: gaps, > 0 open [L], of mortar contact weighted means; meaningless where
-    `is_near` is False: there is no surface within reach. `is_over`: not past the surface's end.
+    `is_near` is False: no surface is within reach. `is_over`: not past the end of the surface.
     `edge`: length of an edge, to which tolerances relate [L].
     """
 
@@ -120,7 +120,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class Slips:
-    """How all possible contacts hold along the surface in the step that was solved last.
+    """Status, slip and friction of all possible contacts in the step that was solved last.
 
     `status`: 0 open, 1 acts and does not slide, 2 slides. Slips and friction are vectors along the
     surface, (n_contact, n_dim - 1); friction times slip is what the step has lost, never below 0.
@@ -129,6 +129,11 @@ class Slips:
     status: Ints        #: (n_contact,)
     slip: Floats        #: (n_contact, n_dim - 1) [L]
     friction: Floats    #: (n_contact, n_dim - 1), against the slip [M L/T^2]
+
+    @property
+    def loss(self) -> float:
+        """The energy that friction has taken in the step."""
+        return float((self.friction*self.slip).sum())
 
 
 @dataclass(frozen=True)
@@ -199,6 +204,9 @@ class Interface:
         self.n_contact = 0      #: contacts possible, known after `prepare`
         self.n_unknown = 0      #: freedoms neither held nor tied to others, known after `prepare`
         self._n_surface = self._n_tie = 0
+        self._held: Flags = np.zeros((0, 0), bool)
+        self._map: Csr | None = None
+        self._has_candidates = False
         self._n_row = 0         # rows of ties, which the library counts before contacts
         self._x = x
         self._handle = _core.emcon_new(x)[1]
@@ -258,7 +266,7 @@ class Interface:
         `faces`: nodes of faces, (k, m) integers, one such array for each kind that the surface has:
         m is 3, 4, or with a node in the middle of each side 6, 8; in the plane 2, edges. Corners
         come first, counter-clockwise as seen from outside the body, then the nodes between a corner
-        and the next. Raises `InputError` as `add_surface`.
+        and the next: `outer_faces` finds them for cells. Raises `InputError` as `add_surface`.
         """
         if not isinstance(name, str) or "\0" in name:
             raise InputError(f"name is {name!r}, not a text")
@@ -340,7 +348,7 @@ class Interface:
     @_exclusive(None)
     def configure(self, *, initiation: str = "persistent", gap_tolerance: float = 0.0,
                   is_last_try: bool = False, is_end: bool = False) -> None:
-        """Settings, also between steps; those not named are the defaults again.
+        """Set options, also between steps; options that are not named get their defaults again.
 
         `initiation`: "persistent" contact holds the gap that its first step began with, which keeps
         energy, "admissible" closes it. `gap_tolerance`: no contact begins with a larger gap per
@@ -354,7 +362,7 @@ class Interface:
 
     @_exclusive(False)
     def prepare(self, held: ArrayLike | None = None) -> Floats:
-        """Finish; from here on there are steps. Returns the positions, (n_node, n_dim) [L].
+        """End the definition; after this, steps can begin. Returns positions, (n_node, n_dim) [L].
 
         `held`: freedoms that the host moves by itself, (n_node, n_dim) booleans; None: none. Slave
         nodes of ties are moved onto their masters: the host takes over the positions. After an
@@ -363,6 +371,7 @@ class Interface:
         if held is None:
             held = np.zeros((self.n_node, self.n_dim), bool)
         flags = flag_array(held, "held", (self.n_node, self.n_dim))
+        self._held = flags.astype(bool)
         self._call(_core.emcon_hold, flags)
         self._call(_core.emcon_build)
         sizes = self._sizes()
@@ -424,11 +433,11 @@ class Interface:
         return matrix(self._call(_core.emcon_links))
 
     def follow(self, field: ArrayLike) -> Floats:
-        """A displacement or velocity, (n_node, n_dim), whose tied freedoms follow the others."""
+        """A displacement or velocity, (n_node, n_dim), with tied nodes moved as the ties say."""
         return self._changed(_core.emcon_follow, field)
 
     def gather(self, field: ArrayLike) -> Floats:
-        """Forces, (n_node, n_dim); those on tied freedoms went to the ones that they follow."""
+        """Forces, (n_node, n_dim), those on tied nodes moved to the nodes that these depend on."""
         return self._changed(_core.emcon_gather, field)
 
     @_exclusive()
@@ -437,7 +446,7 @@ class Interface:
 
     @_exclusive()
     def set_map(self, map: Any) -> None:
-        """Unknowns w of the host's from here on: u = A w + what does not change.
+        """From now on the unknowns are w of the host, with u = A w + a constant.
 
         `map`: A, (n_dim n_node, any), a sparse matrix of scipy, a `Csr` or an array, for points of
         faces of higher order, hanging nodes, rigid bodies or control points. Rows of gradients, and
@@ -451,13 +460,14 @@ class Interface:
         own = as_csr(map, n, "map", shape[1])
         check_csr(own, "map")
         self._call(_core.emcon_set_map, matrix_bytes(own))
+        self._map = own
 
     # ---- a step from the displacements u0 by du, (n_node, n_dim) each [L] ------------------------
 
     @_exclusive()
     def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
                    stop: ArrayLike | None = None, h: float | None = None) -> Flags:
-        """Begin a step with the motion `du` that is expected.
+        """Begin a step; `du` is the motion that you expect.
 
         `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
         Returns those that still can. `stop`, where pairs have friction: the motion with which all
@@ -497,50 +507,23 @@ class Interface:
             raise AnalysisError(f"the step cannot be ended with these contacts: {outcome.name}")
         return motion, lam, active
 
-    def newton(self, u0: ArrayLike, respond: Callable[[Floats], tuple[Any, Any]],
-               free: ArrayLike | None = None) -> Callable[[Floats, int], tuple[Floats, Floats]]:
-        """Newton's method for `solve_step(..., together=True)`, of a residual and a tangent.
+    def newton(self, u0: ArrayLike, respond: Respond, free: ArrayLike | None = None,
+               solve: Solve | None = None) -> Callable[[Floats, int], tuple[Floats, ...]]:
+        """Newton's method for `solve_step`, of a residual and a tangent.
 
         `respond(du)` gives the residual of the step without contact, a field, and its derivative by
-        du, an array or a sparse matrix of scipy over the freedoms of the nodes; `free`: the numbers
-        of those that are solved for, None: all. In each iterate the equations are condensed to the
-        rows of contact. It ends where the motion is round-off of the positions, or no more grows
-        less. Raises `AnalysisError` where it does not.
+        du, an array or a sparse matrix of scipy; after `set_map` both are by the unknowns w. It may
+        give a third result, the `magnitude` of `update_active`. `free`: the numbers of the freedoms
+        that are solved for; None: all that are neither held nor tied. `solve(matrix, right)`: your
+        linear solver, matrix^-1 times the columns of `right`; None: LAPACK or SuperLU.
+
+        What damping pushes is added. In each iterate the equations are condensed to the rows of
+        contact with `together=True`, otherwise to the null space of the selected contacts, which
+        takes neither `free` nor a map. It ends where the motion is round-off of the positions, or
+        does not decrease any more. Raises `AnalysisError` where it does not converge, and where
+        selected contacts follow from others.
         """
-        own = np.arange(self.n_node*self.n_dim) if free is None else np.asarray(free)
-        reach = float(np.abs(self._x).max())
-
-        def solve(du: Floats, n: int) -> tuple[Floats, Floats]:
-            lam, last = np.zeros(n), np.inf
-            for _ in range(_MOST_ITERATES):
-                residual, tangent = respond(du)
-                motion, lam = self._correct(u0, du, lam, np.asarray(residual).ravel(), tangent, own)
-                du.ravel()[own] += motion
-                size = float(np.abs(motion).max(initial=0.0))
-                if size <= 4*_EPSILON*reach or last <= size < 1e-10*reach:
-                    return du, lam
-                last = size
-            raise AnalysisError(f"Newton's method still moves by {size:g}: try a smaller step")
-
-        return solve
-
-    def _correct(self, u0: ArrayLike, du: Floats, lam: Floats, residual: Floats, tangent: Any,
-                 free: Any) -> tuple[Floats, Floats]:
-        """The motion of the free freedoms, and the multipliers that obey the laws of contact."""
-        rows = self.evaluate(u0, du)
-        g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
-        second = self.curvature(lam)
-        right = np.column_stack([g.T, residual[free]])
-        if isinstance(tangent, np.ndarray):
-            solved = np.linalg.solve((tangent - second.toarray())[np.ix_(free, free)], right)
-        else:
-            from scipy.sparse import csc_array
-            from scipy.sparse.linalg import splu
-            solved = splu(csc_array(tangent - second.to_scipy())[free][:, free]).solve(right)
-        by_lam, alone = solved[:, :-1], solved[:, -1]
-        if len(lam):
-            lam = self.solve_contacts(c @ by_lam, rows.defect - c @ alone)
-        return by_lam @ lam - alone, lam
+        return HostNewton(self, np.array(self._field("u0", u0)), respond, free, solve).solve
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
@@ -554,6 +537,7 @@ class Interface:
     def select(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
         """Select the contacts `active`, (n_contact,) booleans; return how many rows they have."""
         flags = self._flags("active", active)
+        self._has_candidates = False
         return self._call(_core.emcon_select, *self._motion(u0, du), flags)
 
     @_exclusive()
@@ -565,6 +549,7 @@ class Interface:
         lets go those that do not push once the step is solved.
         """
         flags = self._flags("active", active)
+        self._has_candidates = True
         return self._call(_core.emcon_select_candidates, *self._motion(u0, du), flags)
 
     @_exclusive()
@@ -581,7 +566,7 @@ class Interface:
 
     @_exclusive()
     def pattern(self, u0: ArrayLike, du: ArrayLike) -> Csr:
-        """What contact may couple in the step that was begun, before it is solved.
+        """Which degrees of freedom contact may couple in this step, known before it is solved.
 
         Values of 1, n_dim n_node each way, or by the unknowns of `set_map`, over all contacts that
         have a surface near, whether they act, stick or slide: `curvature`, and products of rows of
@@ -642,13 +627,13 @@ class Interface:
 
     @_exclusive()
     def slips(self) -> Slips:
-        """How contacts stick and slide, by the multipliers that `update_active` was given."""
+        """Status, slip and friction of all contacts, by the multipliers of `update_active`."""
         status, slip, friction = self._call(_core.emcon_get_slips, self.n_contact + self._n_row)
         return Slips(status[self._n_row:], slip[self._n_row:], friction[self._n_row:])
 
     @_exclusive()
     def law_forces(self) -> tuple[Floats, float]:
-        """What damping pushes at the nodes in the step evaluated last, and the energy it takes.
+        """Damping forces at the nodes in the last evaluated step, and the energy that they take.
 
         Forces, (n_node, n_dim), to be added to those of contact; their derivative is in
         `curvature`. The energy is >= 0.

@@ -108,8 +108,8 @@ contains
          call contact%own_area(scene%x, area)
          if (.not. sum(area) > 0.0_wp) then
             call refuse(scene, step, system%contact(k)%of_pair, "a slave surface " // &
-               "made of nodes has no area to give way by; name its elements and faces, or let " // &
-               "contact be hard", error)
+               "made of nodes has no area, which penalties need; name its elements and faces, " // &
+               "or use hard contact", error)
             return
          end if
          self%area(before + 1:before + size(area)) = area*contact%area_factor
@@ -127,8 +127,8 @@ contains
          if (.not. by_area > 0.0_wp) by_area = step%contact%penalty%factor*merge( &
             augmented_factor, 1.0_wp, self%augments)*of_either(system, scene, k, inner)/sum(area)
          if (.not. by_area > 0.0_wp) then
-            call refuse(scene, step, system%contact(k)%of_pair, "no elastic " // &
-               "element stands on either surface of a contact pair: give its STIFFNESS, " // &
+            call refuse(scene, step, system%contact(k)%of_pair, "neither " // &
+               "surface of a contact pair belongs to elastic elements: give STIFFNESS, the " // &
                "pressure by penetration", error)
             return
          end if
@@ -142,7 +142,7 @@ contains
       subroutine tell(by_what)
          character(len=*), intent(in) :: by_what
 
-         call note_add(system%notes, "contact of pair " // to_text(k) // " gives way by " // &
+         call note_add(system%notes, "contact of pair " // to_text(k) // " is soft, with " // &
             by_what)
       end subroutine tell
 

@@ -10,9 +10,12 @@
 
 #include <emcon.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -91,6 +94,30 @@ struct Contact {
    std::vector<double> lam, pressure, gap, shear, slip, path;
    std::vector<int> is_active, label, pair, way;
 };
+
+// Of each possible contact in the step of a host: `way` is 0 where it is open, 1 where it acts and does
+// not slide, 2 where it slides; slip and friction are vectors of n_dim - 1 components.
+struct Slips {
+   std::vector<int> way;
+   std::vector<double> slip, friction;
+
+   // The energy that friction has taken in the step.
+   double loss() const
+   {
+      double sum = 0;
+      for (std::size_t i = 0; i < slip.size(); ++i) sum += slip[i]*friction[i];
+      return sum;
+   }
+};
+
+// visit(i, j, value) for each entry of a matrix, row by row.
+template <class Visit>
+void each(const emcon_csr &matrix, Visit visit)
+{
+   for (int i = 0; i < matrix.n_row; ++i)
+      for (int k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k)
+         visit(static_cast<std::size_t>(i), static_cast<std::size_t>(matrix.column[k]), matrix.value[k]);
+}
 
 // A model: moved, not copied; closed at its end.
 class Model {
@@ -288,15 +315,69 @@ public:
       return surface;
    }
 
+   // The same of the kind that so many nodes have: 2 in the plane, else 3, 4, 6 or 8.
+   int add_faces(const std::string &name, int n_of_face, const std::vector<int> &node)
+   {
+      const int n_nodes[] = {2, 3, 4, 6, 8}, kinds[] = {3, 5, 9, 22, 23};
+      for (int k = 0; k < 5; ++k)
+         if (n_nodes[k] == n_of_face) return add_faces(name, kinds[k], n_of_face, node);
+      throw InputError(EMCON_ERROR_INPUT, "there are no faces of " + std::to_string(n_of_face) + " nodes");
+   }
+
+   // A pair of surfaces by their numbers; more of it is told by emcon_pair_options.
+   void add_pair(int slave, int master, int formulation, double friction = 0)
+   {
+      emcon_pair_options options = emcon_pair_options();
+      options.friction = friction;
+      call(emcon_add_pair, slave, master, formulation, &options);
+   }
+
+   // Nodes whose freedoms the host moves by itself.
+   void hold(const std::vector<int> &node)
+   {
+      const emcon_sizes of = sizes();
+      std::vector<int> held(n_freedom(of));
+      for (int i : node) {
+         if (i < 0 || i >= of.n_node)
+            throw InputError(EMCON_ERROR_INPUT, "there is no node " + std::to_string(i));
+         for (int a = 0; a < of.n_dim; ++a) held[static_cast<std::size_t>(of.n_dim*i + a)] = 1;
+      }
+      call(emcon_hold, of.n_node, held.data());
+   }
+
+   // Unknowns w of the host's from here on, as emcon_set_map has it; `newton` moves the nodes by it.
+   void set_map(const emcon_csr &map)
+   {
+      call(emcon_set_map, &map);
+      const std::size_t n = static_cast<std::size_t>(map.n_row);
+      Map &own = owned_->map;
+      own.n_unknown = map.n_column;
+      own.start.assign(map.row_start, map.row_start + n + 1);
+      own.column.assign(map.column, map.column + map.row_start[n]);
+      own.value.assign(map.value, map.value + map.row_start[n]);
+   }
+
+   // The same with the freedoms of the nodes that are neither held (emcon_hold) nor tied to others.
+   void set_free_unknowns()
+   {
+      emcon_csr links;
+      call(emcon_links, &links);
+      set_map(links);
+   }
+
    // A step from the displacements `u0`, solved with all candidates until none is missing. Before,
-   // `du` is the expected motion, and `active` has the flags of the step before; after it, those of
-   // this one. `newton(du, n)` solves with the n rows that are selected: it changes du, and returns
-   // their multipliers. `stop` is that of emcon_begin_friction; empty: none.
+   // `du` is the expected motion, and `active` has the flags of the step before (empty: nothing acted);
+   // after it, those of this one. `newton(du, n)` solves with the n rows that are selected: it changes
+   // du, and returns their multipliers. `stop` is that of emcon_begin_friction; empty: none.
    template <class Newton>
    void solve_step(const std::vector<double> &u0, std::vector<double> &du, std::vector<int> &active,
                    const std::vector<double> &stop, Newton newton)
    {
-      const int n_node = sizes().n_node, m = static_cast<int>(active.size());
+      const int n_node = sizes().n_node, m = sizes().n_constraint;
+      if (active.empty()) active.resize(static_cast<std::size_t>(m));
+      if (active.size() != static_cast<std::size_t>(m))
+         throw InputError(EMCON_ERROR_INPUT, "active has " + std::to_string(active.size())
+            + " flags, but there are " + std::to_string(m) + " constraints");
       int n = 0, is_done = 0, outcome = EMCON_STEP_DONE;
       call(emcon_begin_contact, n_node, u0.data(), du.data(), m, active.data(), active.data());
       if (!stop.empty()) call(emcon_begin_friction, n_node, stop.data());
@@ -308,6 +389,49 @@ public:
       }
       if (outcome != EMCON_STEP_DONE)
          throw AnalysisError(outcome, "no set of contacts ends the step: try a smaller one");
+   }
+
+   // Newton's method for solve_step from the displacements `u0`. `solve(du, second, n, columns)` finds
+   // the residual r of the motion du without contact and its derivative K, which gets minus `second`;
+   // it adds r to the last of the n columns, one after the other, and puts K^-1 times each in its
+   // place. There are as many rows as unknowns. It ends where the motion is round-off of the
+   // positions, or does not decrease any more. The model and `u0` have to outlive what is returned.
+   template <class Solve>
+   std::function<std::vector<double>(std::vector<double> &, int)> newton(
+      const std::vector<double> &u0, Solve solve)
+   {
+      if (owned_->map.start.empty())
+         throw InputError(EMCON_ERROR_INPUT, "newton is called before set_map or set_free_unknowns");
+      double reach = 0;
+      for (double place : positions()) reach = std::max(reach, std::fabs(place));
+      return [this, &u0, solve, reach](std::vector<double> &du, int n) {
+         const double eps = std::numeric_limits<double>::epsilon();
+         double last = std::numeric_limits<double>::infinity();
+         std::vector<double> lam(static_cast<std::size_t>(n));
+         for (int iterate = 0; iterate < 40; ++iterate) {
+            const std::vector<double> motion = correction(u0, du, lam, solve);
+            double size = 0;
+            for (double part : motion) size = std::max(size, std::fabs(part));
+            each(owned_->map.seen(), [&](Index i, Index j, double a) { du[i] += a*motion[j]; });
+            if (size <= 4*eps*reach || (last <= size && size < 1e-10*reach)) return lam;
+            last = size;
+         }
+         throw AnalysisError(EMCON_ERROR_ANALYSIS,
+                             "Newton's method does not converge: try a smaller step");
+      };
+   }
+
+   // How contacts stick and slide, by the step that was solved last.
+   Slips slips() const
+   {
+      const emcon_sizes of = sizes();
+      const std::size_t n = static_cast<std::size_t>(of.n_constraint);
+      Slips found;
+      found.way.resize(n);
+      found.slip.resize(n*static_cast<std::size_t>(of.n_dim - 1));
+      found.friction.resize(found.slip.size());
+      call(emcon_get_slips, of.n_constraint, found.way.data(), found.slip.data(), found.friction.data());
+      return found;
    }
 
    // ---- what is given, between reading and building ----
@@ -337,6 +461,50 @@ public:
 private:
    struct Owned;
 
+   using Index = std::size_t;
+
+   // A matrix with arrays of its own.
+   struct Map {
+      std::vector<int> start, column;
+      std::vector<double> value;
+      int n_unknown = 0;
+
+      emcon_csr seen() const
+      {
+         return {static_cast<int>(start.size()) - 1, n_unknown, start.data(), column.data(), value.data()};
+      }
+   };
+
+   // The motion of the unknowns with which an iterate goes on, and the multipliers for it.
+   template <class Solve>
+   std::vector<double> correction(const std::vector<double> &u0, const std::vector<double> &du,
+                                  std::vector<double> &lam, const Solve &solve)
+   {
+      const emcon_sizes of = sizes();
+      const Index n = lam.size(), m = static_cast<Index>(owned_->map.n_unknown);
+      emcon_constraint_report rows;
+      emcon_csr second;
+      double taken = 0;
+      std::vector<double> columns(m*(n + 1)), damping(n_freedom(of)), w(n*n);
+      double *const last = columns.data() + m*n;
+      call(emcon_evaluate_contact, of.n_node, u0.data(), du.data(), &rows);
+      call(emcon_law_forces, of.n_node, damping.data(), &taken);
+      call(emcon_curvature, static_cast<int>(n), lam.data(), &second);
+      each(rows.discrete_gradient, [&](Index k, Index j, double g) { columns[m*k + j] = g; });
+      each(owned_->map.seen(), [&](Index i, Index j, double a) { last[j] -= a*damping[i]; });
+      solve(du, second, static_cast<int>(n) + 1, columns.data());
+      std::vector<double> opening(rows.defect, rows.defect + n), motion(m);
+      each(rows.end_gradient, [&](Index k, Index j, double c) {
+         for (Index l = 0; l < n; ++l) w[n*k + l] += c*columns[m*l + j];
+         opening[k] -= c*last[j];
+      });
+      if (n > 0) call(emcon_solve_contacts, static_cast<int>(n), w.data(), opening.data(), lam.data());
+      for (Index j = 0; j < m; ++j) motion[j] = -last[j];
+      for (Index l = 0; l < n; ++l)
+         for (Index j = 0; j < m; ++j) motion[j] += columns[m*l + j]*lam[l];
+      return motion;
+   }
+
    // A function that was given, and the model whose call it may end.
    template <class Function>
    struct Given {
@@ -347,6 +515,7 @@ private:
    // Stays where it is when a Model is moved.
    struct Owned {
       emcon_model *model = nullptr;
+      Map map;
       std::exception_ptr thrown;
       std::vector<std::unique_ptr<Given<PointFunction>>> points;
       std::vector<std::unique_ptr<Given<ForceFunction>>> forces;

@@ -15,8 +15,7 @@ module emcon_edge_contact_space
    use emcon_edge_stencil_space, only : edge_ends_t, edge_stencil_ends, edge_stencil_motion, &
       edge_stencil_place, edge_stencil_t
    use emcon_guards, only : crossing_bar, crossing_slack
-   use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
-      interaction_reach, interaction_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
    use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_scene, only : scene_t
@@ -51,20 +50,18 @@ contains
       type(edge_contact_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(interaction_t) :: surface
       integer :: k, ends(2)
 
-      surface = pair%interaction
-      surface%damping = contact_damping_t()
-      self%offset = surface%offset
-      call edge_choice_init(self%choice, scene, pair, self%offset + interaction_reach(surface))
+      self%offset = pair%interaction%offset
+      call edge_choice_init(self%choice, scene, pair, self%offset &
+         + interaction_reach(pair%interaction))
       self%n_constraint = size(self%choice%stencil)
       allocate(self%node(self%n_constraint), self%duplicate(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint))
       allocate(self%sagitta(self%n_constraint), self%thickness(self%n_constraint), source=0.0_wp)
       self%may_leave = .true.
       self%max_penetration_at_start = deepest_start
-      call contact_laws_of_surface(surface, self%laws)
+      call contact_laws_of_surface(pair%interaction, self%laws)
       do k = 1, self%n_constraint
          ends = edge_choice_slave(self%choice, k)
          self%node(k) = ends(1)

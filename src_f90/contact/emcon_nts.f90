@@ -11,8 +11,8 @@ module emcon_nts
    use emcon_errors, only : error_t
    use emcon_guard_slack_plane, only : guard_slack_find
    use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
-   use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
-      smoothing_hermite, smoothing_none, interaction_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
+      smoothing_none
    use emcon_kinds, only : wp
    use emcon_nts_choice, only : choice_covers, choice_init, update_candidates, choice_make, &
       choice_pushes_aside, choice_settle, choice_take_nearer, nts_choice_t
@@ -74,7 +74,6 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical, intent(in), optional :: has_twins !! both nodes of a joint have a gap: as parts of
                                                  !! other constraints
-      type(interaction_t) :: surface
 
       call choice_init(self, scene, pair, error, has_twins)
       if (allocated(error)) return
@@ -84,9 +83,7 @@ contains
       self%slack = pair%slack
       if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
          self%own_slack)
-      surface = pair%interaction
-      if (pair%slack > 0.0_wp) surface%damping = contact_damping_t()
-      call contact_laws_of_surface(surface, self%laws)
+      call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine nts_init
 
    pure subroutine nts_configure(self, x, options)

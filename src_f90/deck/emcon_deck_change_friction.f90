@@ -74,7 +74,8 @@ contains
       end if
       if (reader%interaction(changes)%pressure%kind == pressure_hard) return
       call card_error(reader, card, "the surface interaction " // quoted(name) // " has a " &
-         // "pressure by its overclosure: springs of stick would lose what they store; its " &
+         // "pressure by its overclosure: the energy stored in sticking contacts would be " // &
+         "lost; its " &
          // "coefficient holds for the whole run")
       changes = 0
    end subroutine find_interaction

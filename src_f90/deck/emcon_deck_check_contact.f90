@@ -205,8 +205,9 @@ contains
       if (scene%n_dim == n_space) others = "the others"
       if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
          // label_list(pack(scene%node%label, is_guided)) // " of surface " &
-         // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it " &
-         // "in " // others // " only, and is singular where the master faces along the first")
+         // scene%surface(pair%slave)%name // " is prescribed in one direction: contact can " &
+         // "move it in " // others // " only, and cannot where the master faces along the " // &
+         "prescribed one")
    end subroutine check_freedom
 
    !> For each slave node: so many degrees of freedom of one node can fulfil its constraint.

@@ -56,7 +56,7 @@ contains
       do k = 1, size(scene%rigid)
          if (any(is_massless(scene%rigid(k)%element))) call add_error(reader%log, &
             scene%rigid(k)%origin, "rigid body " // scene%rigid(k)%name // " has a MASSLESS " // &
-            "section: it has nothing but its inertia")
+            "section: a rigid body needs a mass")
       end do
       do k = 1, size(scene%step)
          associate (scheme => scene%step(k)%scheme)

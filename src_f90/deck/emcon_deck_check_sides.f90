@@ -120,9 +120,10 @@ contains
          length = scale(length, exponent(maxval(abs(scene%x))))
          if (length <= wall_breadth(master%wall)) return
          advice = " has faces " // to_text(length, 3) // " long, and wall " // master%name &
-            // " is " // to_text(wall_breadth(master%wall), 3) // " wide: nodes meet walls, and " &
-            // "what is between the nodes of a face goes through it untold; take faces that are " &
-            // "smaller than the wall"
+            // " is " // to_text(wall_breadth(master%wall), 3) // " wide: walls stop nodes " &
+            // "only, so that a wall between the nodes of a face passes through it unnoticed; " // &
+            "take " &
+            // "faces that are smaller than the wall"
       end associate
    end subroutine advise_wall
 

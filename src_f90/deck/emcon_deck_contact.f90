@@ -204,11 +204,11 @@ contains
       else if (word == "BOTH") then
          of_card%both_sides = of_card%formulation == formulation_nts
          if (any(of_card%formulation == [formulation_segment, formulation_mortar])) then
-            call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR hold what " &
-               // "lies between the surfaces once; use TYPE=NODE TO SURFACE")
+            call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR integrate " &
+               // "the gap on one of the surfaces; use TYPE=NODE TO SURFACE")
          else if (of_card%formulation == formulation_user) then
-            call refuse_option(reader, card, "SIDES", "AUTO, ONE", "what TYPE=USER holds the " // &
-               "program says that gives it")
+            call refuse_option(reader, card, "SIDES", "AUTO, ONE", "the program that gives " // &
+               "TYPE=USER decides what it constrains")
          end if
       end if
    end subroutine read_sides

@@ -1,6 +1,5 @@
 !> *CONTACT DAMPING of surface interactions, and what it does not go with.
 module emcon_deck_contact_damping
-   use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, option_number, option_word, reader_t
    use emcon_diagnostics, only : add_error, add_warning
@@ -28,13 +27,11 @@ contains
       n_before = reader%log%n_errors
       damping = contact_damping_t()
       call option_word(reader, card, "DEFINITION", "DAMPING COEFFICIENT", word, &
-         "CRITICAL DAMPING FRACTION", "what is critical is by a contact stiffness, and " // &
-         "contact that is held exactly has none")
+         "CRITICAL DAMPING FRACTION", "critical damping is a fraction of a contact " // &
+         "stiffness, and exact contact has none")
       call option_number(reader, card, "TANGENT FRACTION", "a number of 0 or more: the " // &
          "coefficient along the surface by that normal to it", 0.0_wp, huge(1.0_wp), &
          damping%tangent)
-      if (reader%n_dim == n_space .and. damping%tangent > 0.0_wp) call card_error(reader, card, &
-         "TANGENT FRACTION: damping along surfaces in three dimensions is not in this version")
       call data_open(data, card)
       n = 0
       do while (next_line(reader, data))
@@ -93,12 +90,12 @@ contains
             cycle
          end if
          if (any(step_initiation(step) == initiation_massless)) call &
-            warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
-            "PERSISTENT does")
+            warn(pair(i), "needs nodes with mass: both surfaces keep theirs, and gaps are " // &
+            "held as by PERSISTENT")
          if (pair(i)%interaction%damping%clearance > 0.0_wp &
             .or. pair(i)%interaction%damping%tangent > 0.0_wp) cycle
          if (.not. any(step%contact%method == method_penalty)) call warn(pair(i), &
-            "damps nothing: what contact holds exactly does not move along its normal; give a " // &
+            "damps nothing: nodes in exact contact do not move along its normal; give a " // &
             "clearance or a TANGENT FRACTION")
       end do
 

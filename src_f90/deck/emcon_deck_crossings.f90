@@ -47,7 +47,7 @@ contains
          if (allocated(master%wall)) then
             why = "surface " // master%name // " has a shape and no edges of elements"
          else if (pair%formulation == formulation_user) then
-            why = "what TYPE=USER holds the program says that gives it"
+            why = "the program that gives TYPE=USER decides what it constrains"
          else if (pair%interaction%pressure%kind /= pressure_hard) then
             why = "a pressure by the overclosure acts on areas, and edges have none"
          end if

@@ -68,8 +68,8 @@ contains
                "use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
             k = findloc(step_initiation(scene%step), initiation_massless, 1)
             if (k > 0) call refuse("step " // to_text(k) // " has *CONTACT INITIATION, " // &
-               "TYPE=MASSLESS: what has no mass would be balanced without what damps it; use " // &
-               "PERSISTENT")
+               "TYPE=MASSLESS: forces of damping are left out of the balance of nodes without " // &
+               "mass; use PERSISTENT")
          end associate
       end do
 

@@ -80,7 +80,7 @@ contains
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
                // "has RESTITUTION=" // to_text(pair(i)%interaction%restitution) &
                // ", but step " // &
-               to_text(k) // " is explicit: what rebounds there is the bodies alone")
+               to_text(k) // " is explicit, and explicit steps have no law of impact")
             cycle
          end if
          i = findloc(pair%interaction%pressure%kind == pressure_exponential, .true., 1)

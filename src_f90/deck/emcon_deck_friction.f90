@@ -170,7 +170,7 @@ contains
       end if
       if (pair%interaction%pressure%kind /= pressure_hard) return
       if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
-         call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &
+         call refuse(reader, pair, "contact by a penalty, in step " // to_text(k) // "; use " // &
             "*CONSTRAINT METHOD, TYPE=NULL SPACE")
       end if
    end subroutine check_step

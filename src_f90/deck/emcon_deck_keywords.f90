@@ -327,7 +327,7 @@ contains
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
       case ("NOSEPARATION")
-         reason = " (surfaces part; *TIE holds them together)"
+         reason = " (surfaces can separate; *TIE holds them together)"
       case ("RELATIVETOABSOLUTE")
          reason = " (motions are those in space)"
       case ("MULTISTAGE")

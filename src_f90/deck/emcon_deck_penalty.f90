@@ -32,7 +32,7 @@ contains
       if ((has_option(card, "STIFFNESS") .or. has_option(card, "FACTOR")) .and. .not. &
          any(step%contact%method == [method_penalty, method_augmented_lagrange])) then
          call card_error(reader, card, "STIFFNESS and FACTOR are of TYPE=PENALTY and " // &
-            "AUGMENTED LAGRANGE: with the others contact does not give way")
+            "AUGMENTED LAGRANGE: with the other types contact is hard")
       end if
       if (.not. has_option(card, "TOLERANCE")) return
       if (step%contact%method /= method_augmented_lagrange) then
@@ -58,7 +58,8 @@ contains
             if (initiation == initiation_massless) call refuse( &
                "*CONTACT INITIATION, TYPE=MASSLESS: surfaces without mass hold their gaps exactly")
             if (initiation == initiation_velocity_update) call refuse("*CONTACT INITIATION, " // &
-               "TYPE=VELOCITY UPDATE: what is left of gaps would count as energy that impacts took")
+               "TYPE=VELOCITY UPDATE: the energy that a penalty stores would count as lost in " // &
+               "impacts")
             if (method /= method_penalty) cycle
             if (any(pair%interaction%restitution < 1.0_wp)) call refuse( &
                "RESTITUTION below 1: a penalty has " // "no instant at which velocities jump")

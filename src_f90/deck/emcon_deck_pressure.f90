@@ -181,11 +181,11 @@ contains
          if (.not. step_is_dynamic(step(k))) cycle
          if (any(step_initiation(step(k)) == [initiation_massless, &
             initiation_velocity_update])) call refuse("*CONTACT INITIATION of step " // &
-            to_text(k) // ": what gives way has its mass, and no velocities that jump")
+            to_text(k) // ": soft contact needs nodes with mass, and velocities that do not jump")
       end do
       if (any(pair%interaction%restitution < 1.0_wp .and. &
          pair%interaction%pressure%kind /= pressure_hard)) call refuse("RESTITUTION below 1: " // &
-         "what gives way has no instant at which velocities jump; use *CONTACT DAMPING")
+         "soft contact has no instant at which velocities jump; use *CONTACT DAMPING")
       call suit_tensions(reader, pair)
 
    contains

@@ -132,7 +132,7 @@ contains
 
       if (.not. norm2(from) > 0.0_wp .or. abs(norm2(to) - norm2(from)) > rounding*norm2(from)) then
          call data_error(reader, data, "the ends of the arc are " // to_text(norm2(from)) // &
-            " and " // to_text(norm2(to)) // " from its centre, they have to be as far from it")
+            " and " // to_text(norm2(to)) // " from its centre; the two distances must be equal")
          return
       end if
       angle = atan2(from(1)*to(2) - from(2)*to(1), dot_product(from, to))

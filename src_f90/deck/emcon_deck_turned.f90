@@ -110,7 +110,7 @@ contains
       if (mark(node) == 0 .or. is_told(node)) return
       if (.not. scene%node%turned(mark(node))%is_central) return
       call add_error(reader%log, origin, card // ": node " // to_text(scene%node%label(node)) // &
-         " lies on the axis of its *TRANSFORM: nothing is outwards there; hold 1 and 2 at 0 " &
+         " lies on the axis of its *TRANSFORM: it has no radial direction; hold 1 and 2 at 0 " &
          // "both, or take it out of the set")
       is_told(node) = .true.
    end subroutine check_across

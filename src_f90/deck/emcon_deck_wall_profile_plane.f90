@@ -105,7 +105,7 @@ contains
       subroutine tell(at)
          real(wp), intent(in) :: at(2)
 
-         call card_error(reader, card, "the profile has a hollow corner at " // to_text(at(1)) // &
+         call card_error(reader, card, "the profile has a concave corner at " // to_text(at(1)) // &
             ", " // to_text(at(2)) // ", where a node would have two contacts with one surface; " &
             // "put an arc (CIRCL, or FILLET RADIUS=) into it, or make two surfaces of it")
       end subroutine tell

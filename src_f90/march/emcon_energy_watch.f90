@@ -177,7 +177,7 @@ contains
 
       associate (largest => self%largest, rounding => energy_rounding(self))
          if (abs(self%stabilization) > half_digits*largest + rounding) call note_add(reasons, &
-            "loads do work on motions that nothing holds: stabilization bears " // &
+            "loads do work on motions that nothing holds: stabilization takes " // &
             to_text(self%stabilization, 3))
          if (self%dynamic_error > energy_bar*largest + rounding) then
             call closing_text(digits)
@@ -189,11 +189,11 @@ contains
             to_text(self%contact_made/largest, 3) // " of the largest, which bodies " // &
             "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none")
          if (self%contact_kept > energy_bar*largest + rounding) call note_add(reasons, &
-            "contact that gives way has made or taken an energy of " // &
+            "penalty contact has gained or lost an energy of " // &
             to_text(self%contact_kept, 3) // ", " // to_text(self%contact_kept/largest, 3) // &
-            " of the largest, which it should have stored: nodes that were in a surface have " // &
-            "lost it at an end or a corner; in the plane TYPE=NODE TO SURFACE of " // &
-            "*CONTACT PAIR follows them; TYPE=NULL SPACE of *CONSTRAINT METHOD stores nothing")
+            " of the largest, as nodes inside a surface have left it at an end or a corner; " // &
+            "in the plane TYPE=NODE TO SURFACE of *CONTACT PAIR follows them; TYPE=NULL SPACE " // &
+            "of *CONSTRAINT METHOD stores no energy")
          if (self%has_explicit .and. self%contact_taken > most_loss*largest + rounding) then
             call taken_text(self, text)
             call note_add(reasons, text // " as explicit steps stop what touches: a finer mesh " &

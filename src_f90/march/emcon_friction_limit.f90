@@ -53,9 +53,9 @@ contains
          call constraint_index(march%system, id(worst), pair, i)
          call note_add(increment%notes, "the coefficient of friction " &
             // to_text(law(id(worst))%mu) // " is above " // to_text(limit(worst), 4) &
-            // ", up to which the contact of slave node " &
+            // ": in an increment the contact of slave node " &
             // to_text(scene%node%label(march%system%contact(pair)%contact%node(i))) &
-            // " by itself has one solution in an increment: there may be several")
+            // " may have several solutions")
       end associate
    end subroutine friction_limit_tell
 

@@ -104,10 +104,10 @@ contains
 
       associate (surface => scene%surface)
          text = "corners of surfaces " // surface(scene%pair(pair)%slave)%name // " and " &
-            // surface(scene%pair(pair)%master)%name // " catch: edges that turn by " &
-            // to_text(turn/degree, 3) // " degrees slide over each other round a curve, with " &
-            // "forces along it that may be off by " // to_text(100.0_wp*part, 2) // " % of " &
-            // "friction; *SURFACE SMOOTHING, TYPE=HERMITE or a surface of true arcs avoids it"
+            // surface(scene%pair(pair)%master)%name // " catch on each other (edges turn by " &
+            // to_text(turn/degree, 3) // " degrees at each): forces along the surface may be " &
+            // "wrong by " // to_text(100.0_wp*part, 2) // " % of friction; " &
+            // "*SURFACE SMOOTHING, TYPE=HERMITE or a surface of true arcs avoids it"
       end associate
    end function text_of
 

@@ -259,14 +259,15 @@ contains
       associate (pair => scene%pair(i))
          associate (names => scene%surface(pair%slave)%name // " and " // &
                scene%surface(pair%master)%name)
-            call note_add(self%system%notes, "surfaces " // names // ": gaps are measured " // &
-               "between the curves that edges are chords of, for *CONTACT INTERFERENCE; that " // &
-               "changes them by up to " // to_text(change, 3) // ", and leaves " // &
-               to_text(interference, 3))
+            call note_add(self%system%notes, "surfaces " // names // ": gaps are " // &
+               "measured between the curves through the nodes, for *CONTACT INTERFERENCE, not " // &
+               "between straight edges: that changes them by up to " // to_text(change, 3) // &
+               ", and the interference is " // to_text(interference, 3))
             doubt = self%system%contact(i)%contact%curve_doubt()
             if (doubt > doubtful*interference) call note_add(self%warnings, "surfaces " // names &
-               // ": the interference of " // to_text(interference, 3) // " is small beside " // &
-               "what faces are off the curves, and may be wrong by " // to_text(doubt, 2) // &
+               // ": the interference of " // to_text(interference, 3) // " is small compared " // &
+               "with the distance of faces from the curves, and may be wrong by " // &
+               "" // to_text(doubt, 2) // &
                "; smaller faces, or nodes that meet nodes, are better")
          end associate
       end associate
@@ -300,8 +301,8 @@ contains
 
       call overlap_text(overlap, scene%node%label, self%system%space%body, text)
       call note_add(self%warnings, overlap_at_start // ", by " // to_text(overlap%depth, 3) // &
-         " of an edge, " // text // ": no contact pair brings the two together, and their " // &
-         "overlap is not looked at further")
+         " of an edge, " // text // ": no *CONTACT PAIR names the two, and their " // &
+         "overlap is not checked from here on")
    end subroutine warn_of_overlap
 
    !> The grid of the step, who controls sizes on it, and the time where it is taken up.
@@ -389,10 +390,10 @@ contains
       moved = ""
       call layer_share(self%layer, self%system, share, body)
       if (body > 0) moved = "; " // to_text(100.0_wp*share, 2) // " % of the mass of body " // &
-         to_text(body) // " moves inwards, of others less"
+         to_text(body) // " moves into its interior, of other bodies less"
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
          " nodes" // moved // "; " // to_text(count(is_slave) - n) // " slave nodes keep " // &
-         "theirs, as they are prescribed, tied, or given mass, or as too few others hold them")
+         "theirs: they are prescribed, tied or given mass, or too few neighbours hold them")
    end subroutine begin_massless
 
    !> Tell of pairs whose surfaces were to be massless and are not; one side of two is enough.
@@ -447,8 +448,7 @@ contains
          if (.not. step_is_dynamic(step) .or. .not. step%time%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
          call raise(error, err_input, where_text(scene, step%time%tolerance_origin) &
-            // ": error: " // &
-            "TOLERANCE= needs a scheme that tells its error, and this one does not")
+            // ": error: TOLERANCE= needs a scheme that tells its error, and this one does not")
       end associate
    end subroutine check_tolerance
 

@@ -90,7 +90,7 @@ contains
             self%velocity_update%part*push_weights(self%active%set))
       end if
       if (.not. has_root) call note_add(notes, &
-         "velocity update: no root, the energy lost in this step is not restored")
+         "velocity update: no jump of velocities restores the energy lost in this step")
    end subroutine restore_energy
 
    !> What has no mass moves as its displacement says. Where it was balanced anew, what that and
@@ -124,7 +124,8 @@ contains
             call jumps_join(self%end_state%jump, layer%jump)
          else
             call note_add(notes, "the energy " // to_text(lost + layer%released) // &
-               " that contacts took as they opened or closed is not restored: there is no root")
+               " that contacts took as they opened or closed is not restored: no jump of " // &
+               "velocities does")
          end if
       end associate
    end subroutine end_massless

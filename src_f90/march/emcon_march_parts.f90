@@ -223,7 +223,7 @@ contains
          n = n + 1
          label(n)%text = to_text(scene%node%label(i))
       end do
-      call note_add(increment%notes, reason // ": contact nodes take their mass back: " // &
+      call note_add(increment%notes, reason // ": contact nodes get their mass back: " // &
          joined(label(:n), ", ", most_named))
       call mass_return(self, scene, is_back, error)
       if (.not. allocated(error)) call march_renumber(self, scene, error)
@@ -253,7 +253,7 @@ contains
       associate (name => scene%element%kinds(solid%kind(e))%name)
          text = text // "; elements of type " // trim(name) // ", as " &
             // to_text(solid%deck%label(e)) &
-            // ", have motions without strain, which a single one or a single row of them keeps: " &
+            // ", have motions without strain if there is a single one or a single row of them: " &
             // "take two across"
          if (name(len_trim(name):len_trim(name)) == "R") text = text // ", or " &
             // name(:len_trim(name) - 1)
@@ -285,7 +285,7 @@ contains
       case (step_stands_off)
          text = "a contact would close over more than the gap tolerance"
       case (step_not_held)
-         text = "nothing holds what moves without resistance: " // self%active%support%text
+         text = "nothing resists a motion: " // self%active%support%text
          if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
          if (active_set_slides(self%active)) text = text // ", where friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
@@ -293,7 +293,7 @@ contains
          if (.not. self%active%support%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
       case (step_unbalanced)
-         text = "nodes without mass find no balance where contacts open or close"
+         text = "nodes without mass find no equilibrium where contacts open or close"
       case (step_overlaps)
          text = "bodies would overlap where no contact acts"
       case (step_rough)
@@ -352,9 +352,10 @@ contains
       type(march_t), intent(in) :: self
       character(len=:), allocatable, intent(out) :: text
 
-      text = "it snaps: the balance that was found is not stable"
-      if (self%step_check%ratio >= 0.0_wp) text = "it snaps: the works of the increment miss " &
-         // to_text(100.0_wp*self%step_check%ratio, 2) // " % of what the elements store"
+      text = "it snaps through: the equilibrium that was found is not stable"
+      if (self%step_check%ratio >= 0.0_wp) text = "it snaps through: the work of the " &
+         // "increment differs by " // to_text(100.0_wp*self%step_check%ratio, 2) &
+         // " % from the energy that the elements store"
    end subroutine snap_text
 
    !> Add to the reason why the last step failed, which ends a static analysis, what contact and
@@ -383,9 +384,9 @@ contains
       if (evaluation_has_inertia(self%motion%evaluation) &
          .or. .not. sum(self%state%energy) > 0.0_wp) return
       if (scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) return
-      text = text // "; no state of rest was found beyond this time: if a body snaps through or " &
-         // "slips off there, none follows nearby; *STATIC, STABILIZE goes on to the next one, a " &
-         // "*DYNAMIC step follows the motion"
+      text = text // "; no equilibrium was found beyond this time: a body may snap through or " &
+         // "slip off there; *STATIC, STABILIZE goes on to the next equilibrium, a *DYNAMIC step " &
+         // "follows the motion"
    end subroutine failure_text
 
    !> What may hold bodies beside the conditions of the deck: "contact and given forces".

@@ -63,7 +63,7 @@ contains
          if (largest <= out_of_balance*maxval(abs(load) + abs(state%internal))) return
          call note_add(self%warnings, "a force of " // to_text(largest, 3) // " is not balanced " &
             // "at node " // to_text(scene%node%label(maxloc(maxval(left, 1), 1))) // " of a " // &
-            "MASSLESS section as the step begins: it swings from increment to increment; let " // &
+            "MASSLESS section as the step begins: it changes its sign in each increment; let " // &
             "loads there rise from 0 by an *AMPLITUDE, or begin with a *STATIC step")
       end associate
    end subroutine quasi_static_begin

@@ -47,8 +47,8 @@ module emcon_verdict
    real(wp), parameter :: told_stand_off = 0.1_wp
    !> Rotation [rad] beyond which linear sections are wrong by a fifth.
    real(wp), parameter :: most_turn = 0.2_wp
-   character(len=*), parameter :: unpaired = ": no contact pair brings the two together; name " // &
-      "them in a *CONTACT PAIR, or all by *CONTACT"
+   character(len=*), parameter :: unpaired = ": no *CONTACT PAIR names the two; add one, or " // &
+      "name all by *CONTACT"
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
 
@@ -138,7 +138,7 @@ contains
       type(verdict_t), intent(inout) :: self
       type(march_t), intent(in) :: march
       type(solid_t), intent(in) :: solid         !! its elements
-      character(len=*), parameter :: text = "far from the origin distances within element "
+      character(len=*), parameter :: text = "far from the origin: distances within element "
       integer :: e, digits
 
       if (has_warning(self, text)) return
@@ -218,11 +218,11 @@ contains
 
       associate (couple => ledger%tie_couple)
          if (.not. couple%largest > 0.0_wp) return
-         text = "ties with ADJUST=NO exert couples across their gaps, of " // &
-            to_text(couple%largest, 3) // " at most"
+         text = "forces across the gaps of ties with ADJUST=NO have a couple of up to " // &
+            to_text(couple%largest, 3)
          if (norm2(couple%impulse) > 0.0_wp) text = text // ": the angular momentum has changed " &
             // "by " // to_text(norm2(couple%impulse), 3) // ", and is " // &
-            to_text(couple%angular, 3) // " at most; ADJUST=YES closes them"
+            to_text(couple%angular, 3) // " at most; ADJUST=YES closes the gaps"
          call add_warning(self, text)
       end associate
    end subroutine warn_of_gaps
@@ -240,9 +240,9 @@ contains
       left = snap_left(march)
       if (largest > 0.0_wp) left = left*sqrt(sum(march%state%energy)/largest)
       if (left > most_viscous) call add_warning(self, "at the end of step " // &
-         to_text(march%state%clock%i_step) // " STABILIZE bears " // to_text(left, 2) // &
-         " of the largest forces: a body is on its way there; let the step last longer, or " // &
-         "give a smaller part than STABILIZE=" // &
+         to_text(march%state%clock%i_step) // " STABILIZE carries " // to_text(left, 2) // &
+         " of the largest forces: a body is still moving; let the step last longer, or " // &
+         "give a smaller value than STABILIZE=" // &
          to_text(scene%step(march%state%clock%i_step)%stabilization, 2))
    end subroutine warn_of_snap
 
@@ -366,7 +366,7 @@ contains
       call energy_reasons(self%energy, self%reasons)
       call judge_geometry(self)
       if (verdict_law_violation(self) > law_bar) call note_add(self%reasons, &
-         "the laws of contact and friction are missed by " // &
+         "the laws of contact and friction are violated by " // &
          to_text(verdict_law_violation(self), 3) // " of the largest force")
       if (self%unconverged > half_digits) call note_add(self%reasons, "a residual of " // &
          to_text(self%unconverged, 3) // " was accepted at time " // &
@@ -393,8 +393,8 @@ contains
          .and. self%overlap%deepest <= most_overlap(self)) call note_add( &
          found, "bodies overlap by " // to_text(self%overlap%deepest, 3) &
          // " of an edge at time " // &
-         to_text(self%overlap%time, 9) // ", as guards allow: SIDES=BOTH of NODE TO SURFACE " // &
-         "holds all nodes, smaller edges let less in")
+         to_text(self%overlap%time, 9) // ", which guards allow: SIDES=BOTH of NODE TO " // &
+         "SURFACE stops all nodes, smaller edges reduce the overlap")
       do i = 1, found%n
          call add_warning(self, found%item(i)%text)
       end do

@@ -119,12 +119,12 @@ contains
       character(len=:), allocatable, intent(out) :: text
 
       if (has_node) then
-         text = "node " // to_text(scene%node%label(node)) // ", and rolls as a disc; SIDES=BOTH " &
-            // "holds its corners"
+         text = "node " // to_text(scene%node%label(node)) // ", and is treated as a disc, " &
+            // "which rolls; SIDES=BOTH constrains its corners instead"
       else
          text = "(" // to_text(place(1)) // ", " // to_text(place(2)) // "), where its body has " &
-            // "no node: it touches by its corners, each an impact; with the REF NODE there it " &
-            // "rolls"
+            // "no node: it touches with its corners, and each that lands is an impact; with the " &
+            // "REF NODE at this place it rolls"
       end if
    end subroutine about_text
 

@@ -275,9 +275,9 @@ contains
       end do
       if (n_behind == n_over .and. n_within > 0) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: PAD THICKNESS=" &
-            // to_text(pair%interaction%offset, 9) // " is more than what lies between surfaces " &
+            // to_text(pair%interaction%offset, 9) // " is more than the distance of surfaces " &
             // scene%surface(pair%slave)%name // " and " // scene%surface(pair%master)%name // &
-            ", by too much for a step to begin with; take a thinner pad, or move them apart")
+            ", and the first step cannot push them apart; take a thinner pad, or move them apart")
       else if (n_over > 0 .and. n_behind == n_over) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
             // title // " surface " // scene%surface(pair%master)%name // " point away from " // &

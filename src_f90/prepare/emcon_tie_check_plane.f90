@@ -80,7 +80,7 @@ contains
             to_text(maxval(distance(:n))) // &
             " off; node (distance): " // joined(found, ", ", most_named) // "; " // advice
          if (any_near(partners, lonely(:n), distance(:n), edge(:n))) text = text // &
-            ". Nodes that are near lie past an end of the master, or faces do not look at each " &
+            ". Nodes that are near lie past an end of the master, or faces do not face each " &
             // "other: check the face labels"
       end associate
       call raise(error, err_input, text)

@@ -111,7 +111,7 @@ contains
          " and master surface " // scene%surface(tie%master)%name // ": "
       if (all(cells%covered <= unseen*cells%whole)) then
          call raise(error, err_input, text // "the surfaces are near, but their faces do not " // &
-            "look at each other: check the face labels")
+            "face each other: check the face labels")
          return
       end if
       do f = 1, size(cells)
@@ -126,7 +126,7 @@ contains
       end if
       f = findloc(cells%most > two_layers, .true., 1)
       if (f == 0) return
-      text = text // "two layers of the master lie before one face of the slave, "
+      text = text // "two layers of the master lie in front of one face of the slave, "
       call add_face(scene, sides, f, text)
       call raise(error, err_input, text // "; leave one of them out of the master surface")
    end subroutine tie_check_cover
@@ -153,8 +153,8 @@ contains
       end do
       call raise(error, err_input, tie_text(scene, tie) // to_text(n) // " of " // &
          to_text(size(cells)) // " faces of slave surface " // scene%surface(tie%slave)%name // &
-         " have less before them of master surface " // scene%surface(tie%master)%name // &
-         " than all but a strip as wide as the position tolerance (" // &
+         " are not covered by master surface " // scene%surface(tie%master)%name // &
+         ", but for a strip as wide as the position tolerance (" // &
          trim(tolerance_text(tie, default_text)) // "): " // &
          joined(found, "; ", most_named) // "; " // advice)
    end subroutine raise_faces

@@ -86,8 +86,8 @@ contains
             end do
          end associate
          call note_add(notes, "*TIE " // scene%tie(t)%name // ": its surfaces stay apart by up " &
-            // "to " // to_text(largest) // ", as ADJUST=NO asks for: across that the tie " // &
-            "exerts a couple")
+            // "to " // to_text(largest) // ", as ADJUST=NO asks for: forces across that gap " // &
+            "have a couple")
       end do
    end subroutine ties_note_gaps
 

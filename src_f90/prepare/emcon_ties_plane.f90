@@ -164,8 +164,8 @@ contains
             if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%facet, &
                master%facet, is_balanced, error)
             if (allocated(error)) return
-            if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": its meshes " // &
-               "do not fit so well that a constant stress passes exactly")
+            if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": a constant " // &
+               "stress does not pass through its meshes exactly")
          end associate
       end do
    end subroutine note_unbalanced

@@ -137,11 +137,12 @@ contains
                text = scene%surface(pair%slave)%name // " and " // &
                   scene%surface(pair%master)%name // " that cross"
             end if
-            call note_add(notes, "contact: edges of " // text // " are held: sharp ones at " // &
-               "once, others from " // to_text(crossing_slack) // " of a face on")
+            call note_add(notes, "contact: edges of " // text // " are constrained: sharp " // &
+               "ones at " // &
+               "once, others when they are deeper than " // to_text(crossing_slack) // " of a face")
          end associate
       end do
-      if (has_guards) call note_add(notes, "contact: guards hold nodes that the pairs do not: " // &
+      if (has_guards) call note_add(notes, "contact: guards stop nodes that the pairs do not: " // &
          "corners that are deeper than " // to_text(corner_slack) // " of an edge, other nodes " &
          // "than " // to_text(guard_slack))
    end subroutine add_watching
@@ -168,9 +169,9 @@ contains
             ", h = " // to_text(step%time%h) // trim(merge(", NLGEOM", "        ", &
             step%nlgeom)) // ", " // scheme // ", solver " // solver)
          if (.not. step%solution%polishes) call note_add(notes, &
-            "corrections end where the residual is " // &
+            "Newton's method ends where the residual is " // &
             "within " // to_text(step%solution%newton_tolerance) &
-            // ": the energy is kept no better")
+            // ": the energy is kept to about that, not to round-off")
       end associate
       if (k == 1) return
       do i = 1, size(scene%pair)

@@ -341,7 +341,7 @@ contains
          ! In bending it stores more, by the square of this and more.
          thickness = minval(body(i)%high - body(i)%low)/maxval(body(i)%high - body(i)%low)
          if (thickness < compact) call row_put(row, "thickness", thickness, &
-            ", more where it can bend: it is # times as thick as long")
+            ", more if it bends: its thickness is # of its length")
          call rows_add(rows, row)
       end do
    end subroutine advise_rigid

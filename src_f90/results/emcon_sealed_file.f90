@@ -52,12 +52,13 @@ contains
       call file_close(file, ignored)
       if (allocated(error)) return
       if (index(found, mark) /= 1) then
-         call raise(error, err_file, path // " has no seal: it was not written by this version " &
+         call raise(error, err_file, path // " has no checksum: it was not written by this " // &
+            "version " &
             // "of EMCON, or its beginning is damaged. Bring it back from a copy, or run the " &
             // "deck again")
       else if (index(found, trim(seal)) /= 1) then
          call raise(error, err_file, path // " is damaged, or was changed since the run wrote " &
-            // "it: its bytes do not add up. Bring it back from a copy, or run the deck again")
+            // "it: its checksum is wrong. Bring it back from a copy, or run the deck again")
       else
          call add_run(seal, run)
          if (found /= seal) call raise(error, err_file, path // " is of another run, of another " &

@@ -69,8 +69,8 @@ contains
       end associate
       if (allocated(self%largest_force)) then
          if (self%penalty%give > 0.0_wp .and. self%penalty%is_meant) then
-            line = line // "contact gives way by up to " // to_text(self%penalty%give, 3) // &
-               " of an edge, as its PRESSURE-OVERCLOSURE says, nothing else penetrates, "
+            line = line // "contact penetrates by up to " // to_text(self%penalty%give, 3) // &
+               " of an edge, as its PRESSURE-OVERCLOSURE says, nothing else does, "
          else if (self%penalty%give > 0.0_wp) then
             line = line // "contact penetrates by up to " // to_text(self%penalty%give, 3) // &
                " of an edge, nothing else does, "
@@ -156,7 +156,7 @@ contains
          end if
          call note_add(lines, text)
          if (abs(energy%stabilization) > 0.0_wp) call note_add(lines, &
-            "work of what stabilization bears " // to_text(energy%stabilization &
+            "work of stabilization " // to_text(energy%stabilization &
             /max(energy%largest, tiny(1.0_wp)), 3) // " of the largest energy")
       end associate
    end subroutine add_energies
@@ -202,9 +202,9 @@ contains
             "; deepest penetration " // &
             to_text(self%overlap%deepest, 3) // " of an element")
          if (self%overlap%of_facets > max(touching_bar, self%overlap%deepest)) &
-            call note_add(lines, "edges of curved surfaces overlap by up to " // &
-            to_text(self%overlap%of_facets, 3) // " of their length, the curves that they are " // &
-            "chords of do not")
+            call note_add(lines, "straight edges of curved surfaces overlap by up to " // &
+            to_text(self%overlap%of_facets, 3) // " of their length, the curves through their " // &
+            "nodes do not")
       end associate
    end subroutine add_checked
 

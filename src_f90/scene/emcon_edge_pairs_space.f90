@@ -1,8 +1,8 @@
 !> Contact of sharp edges beside pairs in space: what crosses with no node in front of a face.
 !> Source: docs/theory.md, section 14.
 module emcon_edge_pairs_space
-   use emcon_interactions, only : contact_pair_t, formulation_edges, formulation_user, &
-      pair_is_reverse_of, pressure_hard
+   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_edges, &
+      formulation_user, pair_is_reverse_of, pressure_hard
    use emcon_mesh, only : surface_t
    implicit none
    private
@@ -10,8 +10,8 @@ module emcon_edge_pairs_space
 
 contains
 
-   !> The edges of pairs of faces that hold them, those of a pair with both sides once. A pressure
-   !> by the overclosure has no area of edges to act on.
+   !> The edges of pairs of faces that hold them, those of a pair with both sides once.
+   !> Damping and pressures by the overclosure have no area of edges to act on.
    pure subroutine edge_pairs_find(pair, surface, edges)
       type(contact_pair_t), intent(in) :: pair(:)
       type(surface_t), intent(in) :: surface(:)
@@ -30,6 +30,7 @@ contains
       edges%formulation = formulation_edges
       edges%both_sides = .true.
       edges%of_pair = [(i, i = 1, size(pair))]
+      edges%interaction%damping = contact_damping_t()
       edges = pack(edges, is_meant)
    end subroutine edge_pairs_find
 

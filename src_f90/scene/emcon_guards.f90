@@ -5,7 +5,8 @@
 !> small depth on: a corner at once, a node of a smooth side where means of gaps have failed.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
-   use emcon_interactions, only : contact_pair_t, formulation_nts, pair_holds_nodes
+   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_nts, &
+      pair_holds_nodes
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -75,6 +76,7 @@ contains
       new%both_sides = .true.
       new%is_reverse = is_reverse
       new%slack = guard_slack
+      new%interaction%damping = contact_damping_t()      ! that is of the nodes of the pair itself
       new%of_pair = i
       n = n + 1
       guard(n) = new

@@ -321,7 +321,7 @@ contains
          response%refusal = response%refusal // " has failed"
          call raise(response%failure, err_analysis, response%refusal)
       else
-         response%refusal = response%refusal // " has no finite value at a strain that is met"
+         response%refusal = response%refusal // " has no finite value at a strain that occurs"
       end if
    end subroutine refuse
 

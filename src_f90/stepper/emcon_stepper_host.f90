@@ -160,7 +160,7 @@ contains
       call check_options(options, error)
       if (self%scene%n_dim == 3) call check_space(formulation, options, error)
       call check_number("friction", pair%interaction%friction, error, 0.0_wp)
-      call check_damping(pair%interaction%damping, self%scene%n_dim, error)
+      call check_damping(pair%interaction%damping, error)
       if (present(adjust)) call check_number("adjust", adjust, error, 0.0_wp)
       call check_apart(self, slave, master, error)
       if (allocated(error)) return
@@ -173,17 +173,14 @@ contains
       self%scene%pair = [self%scene%pair, pair]
    end subroutine stepper_add_pair
 
-   pure subroutine check_damping(damping, n_dim, error)
+   pure subroutine check_damping(damping, error)
       type(contact_damping_t), intent(in) :: damping
-      integer, intent(in) :: n_dim               !! of the nodes
       type(error_t), allocatable, intent(inout) :: error
 
       call check_number("damping", damping%coefficient, error, 0.0_wp)
       call check_number("the clearance of damping", damping%clearance, error, 0.0_wp)
       call check_number("the flat part of damping", damping%flat, error, 0.0_wp, 1.0_wp)
       call check_number("tangent_fraction", damping%tangent, error, 0.0_wp)
-      call check_that(n_dim == 2 .or. .not. damping%tangent > 0.0_wp, "tangent_fraction: damping " &
-         // "along surfaces in three dimensions is not in this version", error)
    end subroutine check_damping
 
    pure subroutine check_options(options, error)

@@ -242,7 +242,7 @@ FORMS = [
     ("abaqus", "type=SURFACE TO SURFACE, adjust=0.0", "mechanical constraint=KINEMATIC, cpset=Int-1", 0, "parameter CPSET has no effect"),
     ("abaqus", "adjust=0.0", "tracking=STATE", 0, "parameter TRACKING has no effect"),
     ("abaqus", "Behavior, pressure-overclosure=HARD", "Behavior, penalty", 0, "parameter PENALTY has no effect"),
-    ("abaqus", "pressure-overclosure=HARD", "no separation, pressure-overclosure=HARD", 2, "surfaces part; *TIE holds them together"),
+    ("abaqus", "pressure-overclosure=HARD", "no separation, pressure-overclosure=HARD", 2, "surfaces can separate; *TIE holds them together"),
     ("abaqus", "*Static\n", "*Static, stabilize=0.0002, allsdtol=0.05, continue=NO\n", 0, "parameter ALLSDTOL has no effect"),
     ("abaqus", "write, frequency=0\n** \n** FIELD OUTPUT: F-Output-1", "write, number interval=1, time marks=NO", 0,
      "parameter NUMBERINTERVAL has no effect"),

@@ -1,9 +1,9 @@
 """The blocks of `interface_solid` by several processes of MPI: cells and unknowns have owners, surfaces none.
 
 Each process has the whole interface, and asks it with the displacements of all surface nodes: contacts, their
-sets and their multipliers are the same everywhere. It computes the cells that it owns, and of the equations and
-of the rows of contact the columns of its own unknowns. What is exchanged is put together in the order of cells
-and unknowns: the bits do not depend on how many processes there are. Lines that MPI adds are marked by `mpi`.
+sets and their multipliers are the same everywhere. It computes the cells that it owns, and gives the equations
+of its own unknowns to the solver. What is exchanged is put together in the order of cells and unknowns: the bits
+do not depend on how many processes there are. Lines that MPI adds are marked by `mpi`.
 
     mpirun -n 3 python interface_mpi.py KIND FRICTION N_STEP
 """
@@ -11,7 +11,6 @@ and unknowns: the bits do not depend on how many processes there are. Lines that
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 
 import numpy as np
 from interface_solid import Floats, Host, Solid, collision
@@ -40,39 +39,17 @@ class Spread(Solid):
 
 
 class SpreadHost(Host):
-    """The host, whose unknowns have owners."""
+    """The host, whose equations have owners."""
 
     def __init__(self, host: Host) -> None:
         vars(self).update(vars(host))
         self.solid = Spread(host.solid)
-        self.own = np.array_split(self.free, WORLD.size)[WORLD.rank]                     # mpi
 
-    def newton(self, h: float) -> Callable[[Floats, int], tuple[Floats, Floats]]:
-        return lambda du, n: self.solve(h, du, np.zeros(n))
-
-    def solve(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
-        own, free, last = self.own, self.free, np.inf
-        for _ in range(40):
-            force, tangent = self.solid.respond(self.u, du)
-            rows = self.face.evaluate(self.u, du)
-            # A product of some rows may round otherwise than that of all.
-            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force)[own]
-            tangent = tangent[own] + 2/h**2*self.solid.mass[own] - self.face.curvature(lam).toarray()[own]
-            g, c = rows.g.toarray()[:, own].T, rows.c.toarray()[:, own].T
-            equations = np.concatenate(WORLD.allgather(                                  # mpi
-                np.column_stack([tangent[:, free], g, residual, c])))
-            n = len(free)
-            solved = np.linalg.solve(equations[:, :n], equations[:, n:n + len(lam) + 1])
-            by_lam, alone, c = solved[:, :-1], solved[:, -1], equations[:, n + len(lam) + 1:].T
-            if len(lam):
-                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)
-            motion = by_lam @ lam - alone
-            du.ravel()[free] += motion
-            size = np.abs(motion).max()
-            if size <= 1e-15 or last <= size < 1e-11:
-                return du, lam
-            last = size
-        raise ArithmeticError(f"Newton's method still moves by {size:g}")
+    def solve(self, matrix: Floats, right: Floats) -> Floats:
+        """The solver: equations come from their owners. A solver for MPI takes its own rows alone."""
+        own = np.array_split(np.arange(len(matrix)), WORLD.size)[WORLD.rank]                # mpi
+        equations = np.concatenate(WORLD.allgather(np.column_stack([matrix[own], right[own]])))
+        return np.linalg.solve(equations[:, :len(matrix)], equations[:, len(matrix):])
 
 
 if __name__ == "__main__":

@@ -9,19 +9,16 @@ the deformation gradient in the middle. Lines that contact adds are marked by `e
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from emcon.interface import Interface
+from emcon.interface import Interface, outer_faces
 
 Floats = NDArray[np.float64]
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
-#: Corners of the faces, that below and that above first, counter-clockwise as seen from outside.
-FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 
 
 def block(n: tuple[int, int, int], low: Floats, size: Floats, first: int = 0) -> tuple[Floats, NDArray[np.int64]]:
@@ -30,13 +27,6 @@ def block(n: tuple[int, int, int], low: Floats, size: Floats, first: int = 0) ->
     number = {tuple(p): first + k for k, p in enumerate(place)}
     cells = [[number[tuple(p)] for p in cell + CORNERS] for cell in product(*map(range, n))]
     return low + place/n*size, np.array(cells)
-
-
-def skin(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The faces that belong to one cell only."""
-    faces = cells[:, FACES].reshape(-1, 4)
-    _, first, count = np.unique(np.sort(faces), axis=0, return_index=True, return_counts=True)
-    return faces[first[count == 1]]
 
 
 class Solid:
@@ -48,16 +38,14 @@ class Solid:
         slope, volume, shape = [], [], []
         for p in product(0.5 + np.array([-1, 1])/12**0.5, repeat=3):
             part = np.where(CORNERS, p, 1 - np.array(p))
-            n = part.prod(1)
             dn = np.stack([np.delete(part, a, 1).prod(1)*(2*CORNERS[:, a] - 1) for a in range(3)], 1)
             jacobian = np.einsum("ia,eib->eab", dn, x[cells])
             slope.append(np.einsum("eba,ia->eib", np.linalg.inv(jacobian), dn))
             volume.append(np.linalg.det(jacobian)/8)
-            shape.append(n)
+            shape.append(part.prod(1))
         self.slope, self.volume = np.stack(slope, 1), np.stack(volume, 1)     # (cell, point, ...)
-        own = density*np.einsum("ep,pi,pj->eij", self.volume, np.array(shape), np.array(shape))
-        mass = np.zeros((len(x), len(x)))
-        np.add.at(mass, (cells[:, :, None], cells[:, None, :]), own)
+        mass, n = np.zeros((len(x), len(x))), np.array(shape)
+        np.add.at(mass, (cells[:, :, None], cells[:, None, :]), density*np.einsum("ep,pi,pj->eij", self.volume, n, n))
         self.mass = np.kron(mass, np.eye(3))
 
     def gradient(self, u: Floats) -> Floats:
@@ -96,22 +84,23 @@ class Solid:
 
 def strain(d: Floats) -> Floats:
     """Of displacement gradients."""
-    turned = d.swapaxes(-1, -2)
-    return 0.5*(d + turned + turned @ d)
+    return 0.5*(d + d.swapaxes(-1, -2) + d.swapaxes(-1, -2) @ d)
 
 
 class Host:
     """Where a collision stands: displacements, velocities, what contact knows."""
 
-    def __init__(self, solid: Solid, face: Interface, held: NDArray[np.bool_]) -> None:
-        self.solid, self.face, self.free = solid, face, np.flatnonzero(~held.ravel())
+    solve = None            # the linear solver: numpy's
+
+    def __init__(self, solid: Solid, face: Interface) -> None:
+        self.solid, self.face = solid, face
         self.u, self.v = np.zeros(solid.x.shape), np.zeros(solid.x.shape)
         self.active = np.zeros(face.n_contact, bool)                             # emcon
-        #: What friction has taken; contacts that were open, stuck and slid, over all steps.
+        #: What friction and damping have taken; contacts that were open, stuck and slid, over all steps.
         self.lost, self.n_status = 0.0, np.zeros(3, int)
 
     def energy(self) -> float:
-        """Of motion and strain, and what friction has taken."""
+        """Of motion and strain, and what contact has taken."""
         v = self.v.ravel()
         return 0.5*v @ self.solid.mass @ v + self.solid.energy(self.u) + self.lost
 
@@ -121,15 +110,13 @@ class Host:
         return force + self.solid.mass @ (2/h*(du/h - self.v)).ravel(), tangent + 2/h**2*self.solid.mass
 
     def step(self, h: float) -> None:
+        newton = self.face.newton(self.u, lambda du: self.respond(h, du), solve=self.solve)     # emcon
         du, _, self.active = self.face.solve_step(                               # emcon
-            self.u, h*self.v, self.active, self.newton(h), stop=0.5*h*self.v, together=True)
-        slips = self.face.slips()                                                # emcon
-        self.lost += float((slips.friction*slips.slip).sum())
+            self.u, h*self.v, self.active, newton, stop=0.5*h*self.v, h=h, together=True)
+        slips, (_, damped) = self.face.slips(), self.face.law_forces()           # emcon
+        self.lost += slips.loss + damped
         self.n_status += np.bincount(slips.status, minlength=3)
         self.u, self.v = self.u + du, 2/h*du - self.v
-
-    def newton(self, h: float) -> Callable[[Floats, int], tuple[Floats, Floats]]:
-        return self.face.newton(self.u, lambda du: self.respond(h, du), self.free)     # emcon
 
 
 def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool = False, **more: Any) -> Host:
@@ -139,14 +126,15 @@ def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool
     (c, s), x = (np.cos(0.4), np.sin(0.4)), np.concatenate([below, above])
     x[len(below):] = x[len(below):] @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T
     face, cells = Interface(x), np.concatenate([lower, upper])                   # emcon, to prepare
+    (skin,) = outer_faces(cells)
     if itself:
-        slave = master = face.add_faces("skin", skin(cells))
+        slave = master = face.add_faces("skin", skin)
     else:
-        slave, master = face.add_faces("sole", upper[:, FACES[0]]), face.add_faces("plate", lower[:, FACES[1]])
+        slave, master = (face.add_faces(name, skin[np.isclose(x[skin, 2], z).all(1)])
+                         for name, z in (("sole", 0.03), ("plate", 0.0)))
     face.add_pair(slave, master, kind, friction=friction, **more)
-    held = np.isclose(x[:, 2], -0.5)[:, None] & np.ones(3, bool)
-    face.prepare(held)
-    host = Host(Solid(x, cells, (600.0, 400.0), 1.0), face, held)
+    face.prepare(np.isclose(x[:, 2], -0.5)[:, None] & np.ones(3, bool))
+    host = Host(Solid(x, cells, (600.0, 400.0), 1.0), face)
     host.v[len(below):] = [1.0, 0.4, -1.0]
     return host
 

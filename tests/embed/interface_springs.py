@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from emcon.interface import Interface
 
 Floats = NDArray[np.float64]
-EPS = np.finfo(float).eps
 
 
 @dataclass
@@ -94,39 +93,11 @@ class Lattices:
         return residual.ravel(), tangent, magnitude
 
 
-def newton(host: Lattices, face: Interface, h: float, du: Floats) -> tuple[Floats, Floats, Floats]:
-    """Solve a step for the selected contacts, starting from `du`: du, multipliers, magnitude.
-
-    In the null space of the contacts: the motion is part + DF y, and the residual is seen through
-    P^T, where no contact force shows.
-    """
-    reach = abs(host.x).max()
-    last = np.inf
-    for _ in range(25):
-        residual, tangent, magnitude = host.respond(h, du)
-        contact = face.evaluate(host.u, du)                                  # emcon, to the end
-        space = face.null_space()
-        if len(space.redundant):
-            raise ArithmeticError(f"contacts {contact.contact[space.redundant]} are redundant")
-        p, df = space.p.toarray(), space.df.toarray()
-        lam = face.multipliers(residual.reshape(du.shape))
-        tangent -= face.curvature(lam).toarray()
-        part = face.particular(contact.defect).ravel()
-        y = np.linalg.solve(p.T @ tangent @ df, -p.T @ (residual + tangent @ part))
-        motion = part + df @ y
-        du = du + motion.reshape(du.shape)
-        step = abs(motion).max()
-        if step <= 4*EPS*reach or last <= step < 1e-10*reach:
-            return du, lam, magnitude
-        last = step
-    raise ArithmeticError(f"Newton's method still moves by {step:g}")
-
-
 def advance(host: Lattices, face: Interface, h: float, active: NDArray[np.bool_]
             ) -> NDArray[np.bool_]:
     """One step of size h; `active` are the contacts that act, before and after."""
-    du, _, active = face.solve_step(host.u, h*host.v, active,                # emcon
-                                    lambda du, _: newton(host, face, h, du))
+    du, _, active = face.solve_step(host.u, h*host.v, active,                # emcon, in the null space
+                                    face.newton(host.u, lambda du: host.respond(h, du)))
     host.u = host.u + du
     host.v = 2/h*du - host.v
     return active

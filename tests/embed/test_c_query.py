@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ EPS = 2.0**-52
 HALF_MADE = [
     "deck is NULL", "no scene", "no scene", "typed:2: error: .*nowhere", "no scene",
     "", "free to move", "no scene", "no scene", "", "", "not built yet", "not built yet", "", "",
-    "path is NULL", "no scene", "has no seal",
+    "path is NULL", "no scene", "has no checksum",
     "state.h5 does not exist",
 ]
 WITHOUT_ARRAYS = [""]*10 + [
@@ -36,7 +37,7 @@ RUBBISH = [
     "u1 is not finite", "u0 is not finite",
 ]
 # Codes other than 2.
-CODES = {"": 0, "free to move": 3, "has no seal": 4, "state.h5 does not exist": 4,
+CODES = {"": 0, "free to move": 3, "has no checksum": 4, "state.h5 does not exist": 4,
          "cannot create no/such/folder": 4}
 
 
@@ -149,4 +150,6 @@ def test_header_is_clean(language: str, tmp_path: Path) -> None:
     compiler, ending = ("c++", "cpp") if "++" in language else ("cc", "c")
     need(compiler)
     (tmp_path/f"header.{ending}").write_text("#include <emcon.h>\n#include <emcon.h>\n")
-    run(compiler, *WARNINGS, language, f"-I{API}", "-fsyntax-only", tmp_path/f"header.{ending}")
+    command = [compiler, *WARNINGS, language, f"-I{API}", "-fsyntax-only", tmp_path/f"header.{ending}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")

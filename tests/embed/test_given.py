@@ -213,15 +213,23 @@ def test_good_laws_pass(law: Law, size: float) -> None:
     def scaled(strain: np.ndarray) -> Any:
         return tuple(size*part for part in law(strain))
 
+    def spoilt(strain: np.ndarray) -> Any:
+        energy, stress, modulus = scaled(strain)
+        return energy, 1.001*stress, modulus
+
     Model().material("RUBBER", law=scaled)
-    rng = np.random.default_rng(7)
-    check_derivatives(scaled, 0.1*rng.standard_normal((50, 3)))
+    strains = 0.1*np.random.default_rng(7).standard_normal((50, 3))
+    check_derivatives(scaled, strains)
+    with pytest.raises(InputError, match="derivative of the energy"):      # in these units too
+        check_derivatives(spoilt, strains)
 
 
 def test_good_potentials_pass_far_from_the_origin() -> None:
     points = 1e4 + np.random.default_rng(3).standard_normal((20, 2))
     check_derivatives(attraction, points)
     check_derivatives(attraction, points, scale=1e4)
+    with pytest.raises(InputError, match="derivative of the energy"):
+        check_derivatives(lambda x: (2*attraction(x)[0], *attraction(x)[1:]), points)
 
 
 @pytest.mark.parametrize(("spoil", "message"), [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from interface_solid import Floats, Host, collision
+from interface_solid import Floats, collision
 from test_interface_solid import H, N_STEP, own_model
 from test_interface_space import over_the_floor
 
@@ -15,46 +15,12 @@ from emcon.interface import InputError, Interface
 DAMPING = {"damping": (20.0, 0.04, 0.3)}
 
 
-class Damped(Host):
-    """The host whose contact is damped, too."""
-
-    def step(self, h: float) -> None:
-        self.taken = 0.0
-        du, _, self.active = self.face.solve_step(
-            self.u, h*self.v, self.active, lambda du, n: self.solve(h, du, np.zeros(n)), stop=0.5*h*self.v, h=h, together=True)
-        slips = self.face.slips()
-        self.lost += float((slips.friction*slips.slip).sum()) + self.taken
-        self.n_status += np.bincount(slips.status, minlength=3)
-        self.u, self.v = self.u + du, 2/h*du - self.v
-
-    def solve(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
-        free, last = self.free, np.inf
-        for _ in range(40):
-            force, tangent = self.solid.respond(self.u, du)
-            rows = self.face.evaluate(self.u, du)
-            damping, self.taken = self.face.law_forces()
-            g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
-            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force - damping.ravel())[free]
-            tangent += 2/h**2*self.solid.mass - self.face.curvature(lam).toarray()
-            solved = np.linalg.solve(tangent[np.ix_(free, free)], np.column_stack([g.T, residual]))
-            by_lam, alone = solved[:, :-1], solved[:, -1]
-            if len(lam):
-                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)
-            motion = by_lam @ lam - alone
-            du.ravel()[free] += motion
-            size = np.abs(motion).max()
-            if size <= 1e-15 or last <= size < 1e-11:
-                return du, lam
-            last = size
-        raise ArithmeticError(f"Newton's method still moves by {size:g}")
-
-
+@pytest.mark.parametrize("along", [{}, {"tangent_fraction": 0.5}])
 @pytest.mark.parametrize(("kind", "friction"), [("node to segment", 0.0), ("node to segment", 0.4), ("mortar", 0.0), ("mortar", 0.3)])
-def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float) -> None:
-    host = Damped.__new__(Damped)
-    vars(host).update(vars(collision(kind, friction, **DAMPING)))
+def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float, along: dict[str, float]) -> None:
+    host = collision(kind, friction, **DAMPING, **along)
     start = host.energy()
-    model = own_model(host, kind, friction, itself=False, **DAMPING)
+    model = own_model(host, kind, friction, itself=False, **DAMPING, **along)
     with Stepper(model) as program:
         for _ in range(N_STEP):
             program.step(H)
@@ -67,9 +33,10 @@ def test_the_damped_host_gives_what_the_program_gives(kind: str, friction: float
         assert host.lost == pytest.approx(program.ledger["friction_loss"] + taken, abs=1e-13)
 
 
+@pytest.mark.parametrize("fraction", [0.0, 0.6])
 @pytest.mark.parametrize("kind", ["node to segment", "mortar"])
-def test_the_derivative_of_damping_is_in_the_curvature(kind: str) -> None:
-    face, _ = over_the_floor(kind=kind, **DAMPING)
+def test_the_derivative_of_damping_is_in_the_curvature(kind: str, fraction: float) -> None:
+    face, _ = over_the_floor(kind=kind, **DAMPING, tangent_fraction=fraction)
     random = np.random.default_rng(8)
     u0, du, way = 0.01*random.standard_normal((3, face.n_node, 3))
     active = face.begin_step(u0, du, np.zeros(face.n_contact, bool), h=0.01)
@@ -84,6 +51,11 @@ def test_the_derivative_of_damping_is_in_the_curvature(kind: str) -> None:
     size = np.finfo(float).eps**(1/3)
     difference = (force(size) - force(-size))/(2*size)
     assert np.abs(slope - difference).max() < 1e-7*np.abs(slope).max()
+    for way in 0.02*random.standard_normal((5, face.n_node, 3)):
+        face.select(u0, way, face.begin_step(u0, way, np.zeros(face.n_contact, bool), h=0.01))
+        face.evaluate(u0, way)
+        push, taken = face.law_forces()
+        assert taken >= 0 and taken == pytest.approx(-(push*way).sum(), abs=1e-13*np.abs(push).sum())
 
 
 def test_a_rigid_mass_keeps_its_law() -> None:
@@ -142,9 +114,7 @@ def test_damping_needs_the_size_of_the_step() -> None:
         face.evaluate(u, u)
     with pytest.raises(InputError, match="h is 0"):
         face.begin_step(u, u, active, h=0.0)
-    for wrong, said in ((-1.0, "damping is -1, below 0"), ((1, 0, 2), "the flat part of damping is 2"), ((), "one to three numbers"),
-                        (0.0, "in three dimensions is not in this version")):
+    for wrong, said in ((-1.0, "damping is -1, below 0"), ((1, 0, 2), "the flat part of damping is 2"), ((), "one to three numbers")):
         other = Interface(face.positions)
         with pytest.raises(InputError, match=said):
-            other.add_pair(other.add_faces("a", [[0, 1, 4]]), other.add_faces("b", [[2, 3, 6]]), damping=wrong,
-                           tangent_fraction=float(wrong == 0.0))
+            other.add_pair(other.add_faces("a", [[0, 1, 4]]), other.add_faces("b", [[2, 3, 6]]), damping=wrong)

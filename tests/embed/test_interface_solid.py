@@ -7,15 +7,14 @@ import sys
 import numpy as np
 import pytest
 from embed_tools import HERE, run
-from interface_solid import FACES, Host, collision, skin
+from interface_solid import CORNERS, Host, collision
 
 from emcon import Model, Stepper
+from emcon.interface import outer_faces
 
 H, N_STEP = 0.01, 20
-
-
-#: Corners of faces 1 to 6 of a C3D8, in the order of `FACES`: their numbers.
-NUMBERS = (1, 2, 3, 4, 5, 6)
+#: The side of the unit cube, axis and place, that is face 1 to 6 of a C3D8.
+SIDES = ((2, 0), (2, 1), (1, 0), (0, 1), (1, 1), (0, 0))
 
 
 def own_model(host: Host, kind: str, friction: float, itself: bool, **more: object) -> Model:
@@ -26,9 +25,9 @@ def own_model(host: Host, kind: str, friction: float, itself: bool, **more: obje
     plate, block = np.unique(cells[:9]), np.unique(cells[9:])
     model.surface("PLATE", faces=[(k, 2) for k in range(9)])
     model.surface("SOLE", faces=[(k, 1) for k in range(9, len(cells))])
-    outer = set(map(frozenset, skin(cells).tolist()))
-    model.surface("SKIN", faces=[(k, n) for k, cell in enumerate(cells) for n, own in zip(NUMBERS, FACES, strict=True)
-                                 if frozenset(cell[own].tolist()) in outer])
+    outer = set(map(frozenset, outer_faces(cells)[0].tolist()))
+    model.surface("SKIN", faces=[(k, n) for k, cell in enumerate(cells) for n, (axis, place) in enumerate(SIDES, 1)
+                                 if frozenset(cell[CORNERS[:, axis] == place].tolist()) in outer])
     model.interaction("I", **({"friction": friction} if friction > 0 else {}), **more)
     # A surface by nodes holds all of these; of mortar guards would hold what it lets in.
     rules = {} if itself and kind != "mortar" else {"guard": "NO"}

@@ -33,11 +33,16 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(contact_pair_t), intent(in) :: pair(:)
       integer, intent(in) :: slave(:), master(:)
-      type(contact_pair_t), allocatable :: guard(:)
+      type(contact_pair_t), allocatable :: guard(:), damped(:)
       type(surface_t) :: surface(4)
 
       surface(4)%is_nodal = .true.
-      call guards_find(pair, surface, guard)
+      allocate(damped, source=pair)
+      damped%interaction%friction = 0.25_wp
+      damped%interaction%damping%coefficient = 2.0_wp
+      call guards_find(damped, surface, guard)
+      call check_true(error, all(guard%interaction%friction >= 0.25_wp) .and. &
+         .not. any(guard%interaction%damping%coefficient > 0.0_wp), "friction, no damping")
       call check_equal(error, guard%slave, slave, "slaves")
       call check_equal(error, guard%master, master, "masters")
       call check_true(error, all(guard%formulation == formulation_nts), "node to segment")

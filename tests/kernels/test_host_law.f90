@@ -521,7 +521,7 @@ contains
       if (allocated(error)) return
       call stepper_advance(stepper, increment, refused)
       call check_error(error, refused, err_analysis, &
-         "the law given for material RUBBER has no finite value at a strain that is met", "outside")
+         "the law given for material RUBBER has no finite value at a strain that occurs", "outside")
       call check_true(error, increment%n_cut > 1, "it was cut")
       call check_true(error, stepper%march%state%u(1, 2) > 0.3_wp, "parts of it succeeded")
       call check_true(error, stepper%march%state%u(1, 2) < sqrt(1.0_wp + 2.0_wp*0.38_wp) - 1.0_wp, &

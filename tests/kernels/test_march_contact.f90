@@ -412,7 +412,7 @@ contains
       if (allocated(error)) return
       call march_increment(march, scene, increment, stopped)
       call check_error(error, stopped, err_analysis, &
-         "the analysis stops at time 0: nothing holds what moves without resistance", "stopped")
+         "the analysis stops at time 0: nothing resists a motion", "stopped")
       call check_equal(error, increment%n_cut, 0, "cuts")
       call march_free(march)
    end subroutine test_taken

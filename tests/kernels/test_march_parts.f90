@@ -122,7 +122,7 @@ contains
          "Newton's method does not converge (relative residual 0.25 after 7 iterations)", &
          "the system is singular", "a contact would close over more than the gap tolerance", &
          "bodies would overlap where no contact acts", &
-         "nodes without mass find no balance where contacts open or close", &
+         "nodes without mass find no equilibrium where contacts open or close", &
          "the error is 0.5 times TOLERANCE", &
          "contact begins or ends: the error is 0.5 times TOLERANCE", &
          "gaps do not close to TOLERANCE of *CONSTRAINT METHOD in ", &
@@ -146,21 +146,24 @@ contains
                expected = trim(told(i))
                if (status(i) == step_loose) expected = told(i)(:56) // "50 augmentations; give a " &
                   // "larger FACTOR"
-               if (status(i) == step_rough .and. k == kind_static) expected = "it snaps: the " &
-                  // "works of the increment miss 50 % of what the elements store"
+               if (status(i) == step_rough .and. k == kind_static) expected = "it snaps " &
+                  // "through: the work of the increment differs by 50 % from the energy that " // &
+                  "the " &
+                  // "elements store"
                call check_equal(error, text, expected, "status " // to_text(status(i)))
             end do
             march%step_check%ratio = -1.0_wp
             if (k == kind_static) then
                call march_reason(march, stepper%scene, step_rough, text)
-               call check_equal(error, text, "it snaps: the balance that was found is not stable", &
+               call check_equal(error, text, "it snaps through: the equilibrium that was " // &
+                  "found is not stable", &
                   "statics")
             end if
             march%active%support%text = "body A"
             do i = 0, 1
                march%active%support%is_pushed = i == 1
                call march_reason(march, stepper%scene, step_not_held, text)
-               expected = "nothing holds what moves without resistance: body A"
+               expected = "nothing resists a motion: body A"
                if (i == 0) expected = expected // ", on which no load does work; add *BOUNDARY " &
                   // "conditions, or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
                if (i == 1) expected = expected // "; add *BOUNDARY conditions"
@@ -187,7 +190,7 @@ contains
          call march_reason(stepper%march, stepper%scene, step_singular, text)
          expected = "the system is singular"
          if (k == 2) expected = expected // "; elements of type CPE8R, as 1, have motions " &
-            // "without strain, which a single one or a single row of them keeps: take two " &
+            // "without strain if there is a single one or a single row of them: take two " &
             // "across, or CPE8"
          call check_equal(error, text, expected, "reason")
          call stepper_close(stepper)
@@ -332,7 +335,7 @@ contains
    subroutine test_end(error)
       type(error_t), allocatable, intent(out) :: error
       character(len=*), parameter :: held = "is put out of its range; without contact and given " &
-         // "forces the body ", beyond = "; no state of rest was found beyond this time"
+         // "forces the body ", beyond = "; no equilibrium was found beyond this time"
       type(error_t), allocatable :: stopped
       type(stepper_t) :: stepper
       type(increment_t) :: increment

@@ -199,9 +199,10 @@ contains
             n_told = 0
             do i = 1, increment%notes%n
                associate (text => increment%notes%item(i)%text)
-                  if (index(text, "contact nodes take their mass back: ") > 0) then
+                  if (index(text, "contact nodes get their mass back: ") > 0) then
                      n_told = n_told + 1
-                     call check_true(error, index(text, "back: 11, 12, 13") > 0 .or. digits(1.0_wp) &
+                     call check_true(error, index(text, "back: 11, 12, " // &
+                        "13") > 0 .or. digits(1.0_wp) &
                         < digits(1.0_dp), text)
                   end if
                end associate

@@ -5,9 +5,9 @@ module test_nts_states
    use emcon_constraint, only : condition_t
    use emcon_contact_law, only : contact_laws_reach, contact_laws_rub
    use emcon_errors, only : error_t
-   use emcon_guards, only : corner_slack, guard_slack
+   use emcon_guards, only : corner_slack, guard_slack, guards_find
    use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
-      interaction_t, smoothing_hermite, smoothing_none
+      formulation_mortar, interaction_t, smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : scene_t
@@ -363,6 +363,7 @@ contains
       type(block_t) :: lower, upper
       type(nts_t) :: nts, plain
       type(contact_pair_t) :: pair
+      type(contact_pair_t), allocatable :: guard(:)
       real(wp), parameter :: slack(3) = [corner_slack, guard_slack, corner_slack]
       integer :: k
 
@@ -373,8 +374,11 @@ contains
       pair%interaction = interaction_t(friction=0.5_wp, damping=contact_damping_t(1.0_wp, 0.5_wp))
       call nts_init(plain, scene, pair, error)
       if (allocated(error)) return
-      pair%slack = guard_slack
-      call nts_init(nts, scene, pair, error)
+      pair%formulation = formulation_mortar
+      call guards_find([pair], scene%surface, guard)
+      call check_equal(error, size(guard), 2, "guards of mortar")
+      if (allocated(error)) return
+      call nts_init(nts, scene, guard(1), error)
       if (allocated(error)) return
       call check_near(error, [contact_laws_reach(plain%laws), contact_laws_reach(nts%laws)], &
          [0.5_wp, -1.0_wp], 0.0_wp, 1.0_wp, "damping")

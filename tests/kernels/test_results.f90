@@ -379,7 +379,7 @@ contains
       call file_put(file, repeat("junk", 1000), raised)
       call file_close(file, raised)
       call restart_read(restart, base // ".rst.h5", raised)
-      call check_error(error, raised, err_file, "has no seal", "junk")
+      call check_error(error, raised, err_file, "has no checksum", "junk")
       call create_sample(vtk, base, raised)
       call vtkhdf_close(vtk, raised)
       call restart_read(restart, base // ".vtkhdf", raised)

@@ -282,9 +282,9 @@ contains
             if (march%warnings%n > 0) told = march%warnings%item(1)%text
             call check_equal(error, march%warnings%n, 1, "warnings, first: " // told)
             call check_equal(error, told, "bodies overlap as a step begins, by 0.125 " &
-               // "of an edge, node 13 of body 2 is 0.125 behind the edge from node 10 to 9 of " // &
-               "body 1: no contact pair brings the two together, and their overlap is not " // &
-               "looked at further", "told")
+               // "of an edge, node 13 of body 2 is 0.125 behind the edge from node 10 to 9 " // &
+               "of body 1: no *CONTACT PAIR names the two, and their overlap is not " // &
+               "checked from here on", "told")
             call march_free(march)
          end block
       end do

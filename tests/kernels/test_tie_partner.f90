@@ -332,7 +332,7 @@ contains
       scene%x(2, 10:) = scene%x(2, 10:) - 0.0625_wp
       call measure(scene, multiplier_dual, rows, error)
       call expect(error, [character(len=80) :: "5 of 5 nodes", &
-         "faces do not look at each other: check the face labels"])
+         "faces do not face each other: check the face labels"])
    end subroutine test_wrong_side
 
 end module test_tie_partner

@@ -284,7 +284,7 @@ contains
       call expect(scene, "1 of 9 nodes of slave surface UPPER are farther", error)
       call make_boxes(scene, ["C3D8", "C3D8"], [1, 1, 1], [3, 3, 1], 0.0_wp)
       call drop_face(scene, 5)
-      call expect(scene, "1 of 1 faces of slave surface UPPER have less before them", error)
+      call expect(scene, "1 of 1 faces of slave surface UPPER are not covered by", error)
       call make_boxes(scene, ["C3D8", "C3D8"], [2, 2, 1], [2, 2, 1], 0.0_wp)
       scene%x(3, :n) = scene%x(3, :n) + 7.0_wp
       call expect(scene, "do not meet: slave node 1, the nearest one, is 7 from", error)
@@ -292,7 +292,7 @@ contains
       where (scene%x(3, :) < 0.0_wp .and. scene%x(3, :) > -0.75_wp) scene%x(3, :) = -0.0625_wp
       scene%surface(2)%element = [scene%surface(2)%element, scene%surface(2)%element - 4]
       scene%surface(2)%face = [scene%surface(2)%face, scene%surface(2)%face]
-      call expect(scene, "two layers of the master lie before one face of the slave", error)
+      call expect(scene, "two layers of the master lie in front of one face of the slave", error)
    end subroutine test_errors
 
    !> Take a face off the master.

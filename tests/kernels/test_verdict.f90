@@ -104,7 +104,7 @@ contains
       call verdict_line(verdict, line)
       call check_true(error, index(line, "verdict: BAD: ") == 1, line)
       call check_true(error, index(line, "does NOT close") > 0, line)
-      call check_true(error, index(line, "friction are missed by 0.5 of") > 0, line)
+      call check_true(error, index(line, "friction are violated by 0.5 of") > 0, line)
       call check_true(error, .not. verdict_is_good(verdict), "not good")
       call check_true(error, .not. verdict_is_failure(verdict, .false.), "no failure by itself")
       call check_true(error, verdict_is_failure(verdict, .true.), "a failure if strict")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scene_tools import Run
 from space_mesh import CUBE_EDGES, TETRAHEDRON_EDGES, Block
 
 RUBBER = "*HYPERELASTIC, NEO HOOKE\n40., .01\n*DENSITY\n1.\n"
@@ -166,3 +167,16 @@ def dent(angle: float) -> str:
             + f"*NSET, NSET=FLOOR, GENERATE\n{n + 1}, {n + len(two.x)}\n*NSET, NSET=TOP\n{top}*BOUNDARY\nFLOOR, 1, 3\n"
             + "*STEP, NLGEOM\n*STATIC, DIRECT\n.25, 1.\n*NEWTON, TYPE=FULL\n*BOUNDARY\nTOP, 1, 1, 0.\n"
             + f"TOP, 2, 2, -.05\nTOP, 3, 3, -.1\n*NODE FILE\nU\n*END STEP\n")
+
+
+def quadratic_increments(run: Run) -> int:
+    """How many increments with contact have four residuals or more, each about the square of the one before, or round-off."""
+    n = 0
+    for row, active in zip(run.increments, run.history["active"][1:], strict=True):
+        residuals = [float(word) for word in row[-1].split()[9:]]
+        if active == 0 or len(residuals) < 4:
+            continue
+        n += 1
+        for before, after in zip(residuals[1:], residuals[2:], strict=False):
+            assert after <= max(1.0e3*before**2, 1.0e-14), row[-1]
+    return n

@@ -92,7 +92,7 @@ def test_bodies_without_a_pair_that_go_through_each_other_are_told(tmp_path, gap
     scene.pairs = [("LEFT", "FLOOR"), ("RIGHT", "FLOOR"), *[("LEFT", "RIGHT")]*is_paired]
     run = run_deck(scene.deck(AUTO), tmp_path, code=3*warns, formulation=NODES)
     assert (max(overlap.frames(run.fields())).by_edge > 0.1) is not is_paired
-    told = [text for text in run.verdict["reasons"] if "no contact pair brings the two" in text]
+    told = [text for text in run.verdict["reasons"] if "no *CONTACT PAIR names the two" in text]
     assert len(told) == warns and run.verdict["verdict"] == ("bad" if warns else "good")
     assert (run.verdict["penetration"] > 0.1) is warns
     assert ("nothing penetrates" in run.log) is is_paired
@@ -100,7 +100,7 @@ def test_bodies_without_a_pair_that_go_through_each_other_are_told(tmp_path, gap
     assert len(stays) == (gap < 0) == ("nothing else penetrates" in run.log)
     if stays:
         assert re.match(r"bodies overlap as a step begins, by 0\.2 of an edge, node \d+ of body [23] is 0\.05 "
-                        r"behind the edge .* of body [23]: no contact pair", stays[0])
+                        r"behind the edge .* of body [23]: no \*CONTACT PAIR", stays[0])
 
 
 @pytest.mark.parametrize("cells", [(1, 1), (2, 3)])
@@ -114,7 +114,7 @@ def test_bodies_of_a_deck_without_contact_are_looked_at(tmp_path, cells):
         deck.remove(card)
     run = run_deck(deck, tmp_path, code=3)
     assert run.verdict["penetration"] >= 0.39 and run.history["penetration"][-1] >= 0.39
-    assert "name them in a *CONTACT PAIR" in run.verdict["reasons"][0]
+    assert "names the two; add one, or name all by *CONTACT" in run.verdict["reasons"][0]
 
 
 def test_decks_made_anew():

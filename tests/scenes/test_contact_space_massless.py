@@ -20,7 +20,7 @@ MASSLESS = "*CONTACT INITIATION, TYPE=MASSLESS\n"
 #: Of positions of a part and of the whole: steps end at residuals of 1e-10.
 SAME = 1.0e-10
 #: What the log says where nodes find no balance.
-BACK = "take their mass back"
+BACK = "get their mass back"
 
 
 def ran(folder: Path, text: str) -> Run:

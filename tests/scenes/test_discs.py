@@ -111,7 +111,7 @@ def test_it_rolls_down_a_slope(order, tmp_path):
     assert x[-1, 0] == pytest.approx(0.5*speed, rel=1e-3)
     assert np.abs(x[:, 1] - 1.0).max() < 1e3*EPSILON
     assert np.abs((turn - turn[0]) + (x[:, 0] - x[0, 0])).max() < 1e-3*x[-1, 0]
-    assert "is a rigid circle of radius 1 about node 1, and rolls as a disc" in " ".join(run.log.split())
+    assert "is a rigid circle of radius 1 about node 1, and is treated as a disc, which rolls" in " ".join(run.log.split())
 
 
 def test_a_disc_rolls_off_a_disc(tmp_path):
@@ -182,7 +182,7 @@ def test_without_a_node_in_its_centre_it_is_a_polygon_and_told(tmp_path):
     bodies = disc(1, (0.0, 1.0), 1.0, "A", hub=False) + profile("START, -3., 0.\nLINE, 9., 0.")
     run = run_deck(deck(bodies, "SA, GROUND", [9001], 0.01, 0.02), tmp_path)
     assert "is a rigid circle of radius 1 about (0, 1), where its body has no node" in " ".join(run.log.split())
-    assert "rolls as a disc" not in run.log
+    assert "is treated as a disc" not in run.log
 
 
 @pytest.mark.parametrize(("n", "more"), [(48, ""), (72, ", SIDES=BOTH"), (72, ", SIDES=ONE")])

@@ -524,7 +524,7 @@ def test_the_limit_of_a_rod(angle, tmp_path):
         scene.pairs = [("ROD", "FLOOR")]
         make_rigid(scene, "ROD", (0, y), (0.0, -1e-3))
         run = run_deck(rubbing(scene.deck(ONE), mu), tmp_path/f"{mu}", **NODES)
-        told += re.findall(r"is above (\S+), up to which", run.log)
+        told += re.findall(r"is above (\S+): in an increment", run.log)
     assert len(told) == 1 and float(told[0]) == pytest.approx(limit, rel=2e-3)
 
 

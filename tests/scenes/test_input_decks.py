@@ -85,6 +85,21 @@ def test_seal(tmp_path):
     assert 2.1*found[0] < found[1] < 3.0*found[0]
 
 
+def test_wheel(tmp_path):
+    """Lame's pressure of the fit; at the end all that touches the ground slides, and only then."""
+    deck = DECKS / "wheel.inp"
+    pressure, coefficient = figures(deck, r"after step 1 (\S+) \(Lame.*?ground is (\S+) times")
+    run = run_deck(deck, tmp_path)
+    fields, history = run.fields(), run.history
+    fit = fields["contact_pressure"][np.abs(fields.time - 1.0).argmin()]
+    assert fit[fit > 0] == pytest.approx(pressure, rel=0.04) and (fit > 0).sum() >= 96
+    ratio = np.abs(history["pair2_force_x"][21:]/history["pair2_force_y"][21:])
+    slides = ratio > coefficient*(1 - 1e-10)
+    assert ratio.max() < coefficient*(1 + 1e-12) and not slides[:4].any() and slides[-4:].all()
+    last = fields["contact_pressure"][-1][np.linalg.norm(fields.x, axis=1) < 98]
+    assert 60 < (last > 0).sum() < 96
+
+
 def test_spinning_ring(tmp_path):
     deck = DECKS / "spinning_ring.inp"
     energy, mass = figures(deck, r"total energy (\S+) \(all kinetic at the start\); mass (\S+);")

@@ -17,7 +17,7 @@ from book import forces  # noqa: E402
 from trade_discs import roughness  # noqa: E402
 
 MASSLESS = {"initiation": "MASSLESS"}
-BACK = "contact nodes take their mass back"
+BACK = "contact nodes get their mass back"
 NTS = {"formulation": "NODE TO SURFACE", "sides": "AUTO"}
 MORTAR = {"formulation": "MORTAR", "sides": "ONE"}
 EPS = np.finfo(float).eps
@@ -122,7 +122,7 @@ def test_guarded_nodes_may_go_in_as_far_as_guards_allow(tmp_path):
     assert "guarded, not held" in run.log
     assert 1e-3 < worst(run.fields()).by_edge < 0.055
     assert run.verdict["verdict"] == "good" and run.verdict["guarded_increments"] > 0
-    assert any("as guards allow" in text for text in run.verdict["warnings"])
+    assert any("which guards allow" in text for text in run.verdict["warnings"])
     assert balances(run.history) < 1e-12
 
 

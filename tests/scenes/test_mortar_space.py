@@ -7,7 +7,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from contact_space_scenes import bodies, dynamic, faces, impact, over_the_end, pair, press, slide, stack, turned, velocities
+from contact_space_scenes import (bodies, dynamic, faces, impact, over_the_end, pair, press, quadratic_increments,
+                                  slide, stack, turned, velocities)
 from space_mesh import Block
 from test_contact_space import BALANCE, check_impact, moments, ran, scaled
 from test_statics_space import bore, lame, shells
@@ -55,15 +56,7 @@ def test_a_ball_bounces_off_a_plate(first: str, second: str, tmp_path: Path) -> 
 def test_newton_is_quadratic(tmp_path: Path) -> None:
     """Residuals of steps with contact: each about the square of the one before, or round-off."""
     run = ran(tmp_path, impact("C3D4", "C3D8", "*NEWTON, TYPE=FULL\n", options=MORTAR, cells=3))
-    n = 0
-    for row, active in zip(run.increments, run.history["active"][1:], strict=True):
-        residuals = [float(word) for word in row[-1].split()[9:]]
-        if active == 0 or len(residuals) < 4:
-            continue
-        n += 1
-        for before, after in zip(residuals[1:], residuals[2:], strict=False):
-            assert after <= max(1.0e3*before**2, 1.0e-14), row[-1]
-    assert n > 10
+    assert quadratic_increments(run) > 10
 
 
 @pytest.mark.parametrize(("kind", "cells", "angle"), [
@@ -138,7 +131,7 @@ def test_unlike_faces_land_flat(options: str, cells: int, tmp_path: Path) -> Non
     history = run.history
     assert run.verdict["verdict"] == "good"
     assert history["cuts"].sum() == 0
-    assert "take their mass back" not in run.log
+    assert "get their mass back" not in run.log
     assert history["active"].max() >= (cells + 1)**2
     assert history["active"][-1] == 0
     for name in ("px", "py", "pz", "lx", "ly", "lz"):

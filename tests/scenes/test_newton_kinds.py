@@ -42,7 +42,7 @@ def test_without_polish_it_ends_at_the_tolerance(tmp_path, kind):
     errors = [run.verdict["largest_energy_error"]/run.verdict["largest_energy"]
               for run in (rough, fine)]
     assert errors[1] < 16*EPSILON*n < errors[0] < tolerance*n
-    assert "corrections end where the residual is within 1.00000E-08" in rough.log
+    assert "Newton's method ends where the residual is within 1.00000E-08" in rough.log
 
 
 def test_a_guess_without_forces_leaves_the_factor(tmp_path):

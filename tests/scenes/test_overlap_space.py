@@ -49,7 +49,7 @@ def test_a_block_sinks_into_another(kind: str, tmp_path: Path) -> None:
     assert list(run.history["penetration"]) == pytest.approx([0, 0.03/length, 0.06/length], rel=1e-9, abs=1e-15)
     (reason,) = run.verdict["reasons"]
     assert re.search(r"time 0.2, node \d+ of body 1 is 0.06 behind the face of nodes \d+(, \d+){2,7} of body 2: no "
-                     r"contact pair brings the two together; name them in a \*CONTACT PAIR", reason)
+                     r"\*CONTACT PAIR names the two; add one, or name all by \*CONTACT", reason)
     faces = 96 if kind in TETRAHEDRA else 48
     assert f"overlap checked: 2 bodies, {faces} faces; deepest penetration " in run.log
 
@@ -120,7 +120,7 @@ def test_a_block_goes_through_a_plate_in_one_step(kind: str, tmp_path: Path) -> 
     block = Block(kind, (2, 2, 2), (0.3, 0.3, 0.3), place=turned(3, (-0.3, -0.3, 0.)))
     run = together(tmp_path, [plate(kind), block], [(0., 0., 0.), (0.1, 0.05, -1.2)], 1., 1)
     assert 0.3 < run.verdict["penetration"] < 1.5
-    assert "no contact pair brings the two together" in run.verdict["reasons"][0]
+    assert "no *CONTACT PAIR names the two" in run.verdict["reasons"][0]
     frames = overlap.frames(run.fields())
     assert max(frames).depth == 0
 

@@ -110,7 +110,7 @@ def test_guards_keep_momenta_and_are_told(tmp_path):
     change = np.abs(momentum.sum(1) - momentum[0].sum(0)).max()
     # 18 nodes and 25 increments, each with Newton's rounding of a few dozen operations.
     assert change <= 1e3*EPSILON*np.abs(momentum).max()
-    assert "contact: guards hold nodes that the pairs do not" in done.run.log
+    assert "contact: guards stop nodes that the pairs do not" in done.run.log
     advice = re.search(r"guards act in \d+ increments; to need none: (.*)", done.run.log)[1]
     assert advice.startswith("TYPE=NODE TO SURFACE, ")
 

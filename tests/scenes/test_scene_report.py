@@ -113,7 +113,7 @@ def test_what_can_bend_is_told_in_space(tmp_path):
         change = 100*np.linalg.norm(impulse[1] - impulse[0])/np.linalg.norm(impulse[0])
         assert math.isclose(advice["rebound_percent"], 1.0, rel_tol=1e-8)
         assert ("thickness" in advice) == (change > advice["rebound_percent"])
-        assert ("more where it can bend" in advice["text"]) == (thick < 0.5)
+        assert ("more if it bends" in advice["text"]) == (thick < 0.5)
 
 
 def test_a_comb_in_space_has_its_cure(tmp_path):

@@ -497,7 +497,7 @@ def test_the_stiffness_is_told_and_follows_the_material(tmp_path):
         deck = discs(ONE)
         deck.map_numbers("*HYPERELASTIC", lambda words, e=stiffness: [str(e), words[1]])
         run = run_deck(deck, tmp_path/str(stiffness), method=PENALTY)
-        told.append(float(run.log.split("gives way by a stiffness of ")[1].split(",")[0]))
+        told.append(float(run.log.split("is soft, with a stiffness of ")[1].split(",")[0]))
     assert told[1] == pytest.approx(4*told[0], rel=1e-8)
     edge = math.pi/32
     assert 100/edge < told[0] < 20*100/edge

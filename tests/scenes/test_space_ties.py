@@ -243,8 +243,8 @@ def two_sides(upper: Block, slave: tuple[int, int] = (2, 0), master: tuple[int, 
 @pytest.mark.parametrize(("low", "slave", "master", "options", "told"), [
     ((0, 0, .8), (2, 0), (2, 1), "", "the surfaces do not meet: slave node 28, the nearest one, is 0.3 from the master"),
     ((.4, 0, .5), (2, 0), (2, 1), "", "8 of 16 nodes of slave surface SLAVE are farther from master surface MASTER than"),
-    ((0, 0, .5), (2, 1), (2, 1), ", POSITION TOLERANCE=1.", "their faces do not look at each other: check the face labels"),
-    ((0, 0, .5), (0, 0), (2, 1), ", POSITION TOLERANCE=.6", "their faces do not look at each other: check the face labels")])
+    ((0, 0, .5), (2, 1), (2, 1), ", POSITION TOLERANCE=1.", "their faces do not face each other: check the face labels"),
+    ((0, 0, .5), (0, 0), (2, 1), ", POSITION TOLERANCE=.6", "their faces do not face each other: check the face labels")])
 def test_sides_that_do_not_fit(low, slave, master, options, told, tmp_path: Path) -> None:
     """Each is an error with its line and what there is to know."""
     upper = box("C3D8", (3,)*3, low, np.array(low) + [1, 1, .5])

@@ -191,7 +191,7 @@ def test_press_fit_of_coarse_meshes(options: str, tmp_path: Path) -> None:
     run = ran(tmp_path, shells((4, 5), 1e-3).replace("INTERACTION=I\nF1", f"INTERACTION=I{options}\nF1"))
     assert run.verdict["verdict"] == "good"
     assert bore(run) == pytest.approx(lame(1e-3), rel=0.4)
-    assert "small beside what faces are off the curves" in run.errors
+    assert "small compared with the distance of faces from the curves" in run.errors
 
 
 @pytest.mark.parametrize(("method", "accuracy"), [("SADDLE POINT", ACCURACY), ("AUGMENTED LAGRANGE", 1.0e-3)])

@@ -259,4 +259,4 @@ def test_bodies_that_touch_are_not_meant_to_go_on(turn, tmp_path):
     done = emcon(deck.write(tmp_path/"scene.inp"), "--quiet", "--output", tmp_path)
     assert done.returncode == 3
     assert "bodies overlap by 0.8 of an edge" in done.stderr
-    assert "no contact pair brings the two together" in done.stderr
+    assert "no *CONTACT PAIR names the two" in done.stderr

@@ -110,8 +110,8 @@ def no_such_freedom(case: Case) -> str:
 def contact(case: Case) -> str:
     case.before = ("*SURFACE, NAME=A\nALL, S1\n*SURFACE, NAME=B\nALL, S2\n"
                    "*SURFACE INTERACTION, NAME=I\n*CONTACT DAMPING, TANGENT FRACTION=.5\n.2\n"
-                   "*CONTACT PAIR, INTERACTION=I\nA, B\n")
-    return "in three dimensions is not in this version"
+                   "*CONTACT PAIR, INTERACTION=I, TYPE=SEGMENT\nA, B\n")
+    return "TYPE=SEGMENT is for plane models"
 
 
 def plane_elements_too(case: Case) -> str:

@@ -148,6 +148,49 @@ void give_a_spring()
    other.advance();                        // the model can go on
 }
 
+// The call fails with a text that holds these words.
+template <class Call>
+void refused(const char *words, Call call)
+{
+   try {
+      call();
+   } catch (const emcon::InputError &error) {
+      require(std::string(error.what()).find(words) != std::string::npos, words);
+      return;
+   }
+   require(false, words);
+}
+
+// A mass on two feet falls on a floor, by the calls for hosts, and what these refuse.
+void land_on_a_floor()
+{
+   std::vector<double> u(8), du{0, 0, 0, 0, 0, -0.2, 0, -0.2};
+   const std::vector<double> expected = du;
+   std::vector<int> active;
+   emcon::Model face = emcon::Model::of_nodes({-1, 0, 1, 0, -0.3, 0.1, 0.3, 0.1});
+   refused("no faces of 5 nodes", [&] { face.add_faces("bad", 5, {0, 1, 2, 3, 4}); });
+   refused("no node 4", [&] { face.hold({4}); });
+   const int floor = face.add_faces("floor", 2, {1, 0}), sole = face.add_faces("sole", 2, {2, 3});
+   emcon_contact_settings statics = emcon_contact_settings();
+   statics.is_end = 1;
+   statics.initiation = EMCON_ADMISSIBLE;
+   face.call(emcon_set_contact, &statics);
+   face.add_pair(sole, floor, EMCON_NODE_TO_SEGMENT);
+   face.hold({0, 1});
+   face.build();
+   auto towards = [&](const std::vector<double> &at, const emcon_csr &second, int n, double *columns) {
+      emcon::each(second, [](std::size_t, std::size_t, double value) { require(value == 0, "a straight floor"); });
+      for (int i = 0; i < 4; ++i) columns[4*(n - 1) + i] += at[4 + i] - expected[4 + i];
+   };
+   refused("before set_map or set_free_unknowns", [&] { face.newton(u, towards); });
+   face.set_free_unknowns();
+   face.solve_step(u, du, active, {}, face.newton(u, towards));
+   for (int i = 0; i < 8; ++i) require(std::abs(du[i] - 0.5*expected[i]) < 1e-15, "the feet stand on the floor");
+   require(active.size() == 2 && active[0] && active[1] && face.slips().loss() == 0, "both of them, without friction");
+   active.resize(3);
+   refused("active has 3 flags, but there are 2", [&] { face.solve_step(u, du, active, {}, face.newton(u, towards)); });
+}
+
 }  // namespace
 
 int main(int argc, char **argv)
@@ -158,5 +201,6 @@ int main(int argc, char **argv)
    run_the_ring(argv[1]);
    stop_by_exceptions(argv[1]);
    give_a_spring();
+   land_on_a_floor();
    return 0;
 }
