@@ -127,7 +127,7 @@ contains
          lumped%column = [(i - 1, i = 1, solid%n_node)]
          value = 0.0_hp
          do e = 1, solid%n_element
-            associate (n => solid%geometry(e)%n_node)
+            associate (n => solid%trait%n_node(e))
                call lumped_mass(solid%mass%consistent(:n, :n, e), share(:n))
                do i = 1, n
                   associate (to => value(solid%node(i, e)))

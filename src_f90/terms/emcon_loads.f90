@@ -70,7 +70,7 @@ contains
       self%node = solid%node
       self%volume_mass = solid%mass%of_volume
       self%thickness = solid%thickness
-      self%is_axial = solid%is_axial
+      self%is_axial = solid%is_of_rings
       self%is_linear = solid%trait%is_linear
       allocate(self%load(0))
       allocate(self%frame(size(scene%x, 1) + 1, size(scene%rigid)))
@@ -96,7 +96,7 @@ contains
       allocate(self%own_mass, mold=solid%mass%of_volume)
       allocate(self%first_moment(size(x, 1), size(solid%node, 1), solid%n_element))
       do e = 1, solid%n_element
-         associate (n => solid%geometry(e)%n_node)
+         associate (n => solid%trait%n_node(e))
             associate (mass => solid%mass%consistent(:n, :n, e), node => solid%node(:n, e))
                self%own_mass(:n, e) = sum(mass, 2)
                self%first_moment(:, :n, e) = matmul(x(:, node), mass)
