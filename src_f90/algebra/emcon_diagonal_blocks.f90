@@ -23,7 +23,9 @@ module emcon_diagonal_blocks
       integer :: first = 0                       !! unknowns of the blocks before it
       integer, allocatable :: unknown(:)         !! (n) ascending
       logical :: is_range = .false.              !! which follow each other
-      type(csr_t) :: matrix                      !! scale times the symmetric part
+      !> Scale times the symmetric part; without values until there is a factor, and where it is an
+      !> incomplete one: the solver has them then
+      type(csr_t) :: matrix
       integer, allocatable :: upper(:)           !! (n) work space: places in the rows
       real(dp), allocatable :: b(:), image(:)    !! (n) work space, where they do not
       class(sparse_solver_t), allocatable :: solver
@@ -216,7 +218,6 @@ contains
       end do
       m = block%matrix%row_start(n + 1)
       allocate(block%matrix%column(m), source=0)
-      allocate(block%matrix%value(m), source=0.0_dp)
       do i = 1, n
          m = block%matrix%row_start(i) - matrix%row_start(block%unknown(i))
          do k = matrix%row_start(block%unknown(i)) + 1, matrix%row_start(block%unknown(i) + 1)
@@ -288,6 +289,7 @@ contains
       block%n_factor = block%n_factor + 1
       call block%solver%factorise(block%matrix%value, block%error)
       block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
+      if (block%solver%is_incomplete) deallocate(block%matrix%value)
    end subroutine factorise
 
    !> The values of a block: entries meet those across the diagonal in the order of the rows.
@@ -299,7 +301,8 @@ contains
       real(dp) :: mean
       integer :: i, j, k, m, start
 
-      is_changed = .false.
+      is_changed = .not. allocated(block%matrix%value)
+      if (is_changed) allocate(block%matrix%value(size(block%matrix%column)))
       associate (rows => block%matrix, upper => block%upper)
          do i = 1, rows%n_row
             start = matrix%row_start(block%unknown(i)) - rows%row_start(i)
@@ -311,7 +314,7 @@ contains
                upper(j) = m + 1
                mean = scale*0.5_dp*(matrix%value(start + k) + matrix%value(m &
                   + matrix%row_start(block%unknown(j)) - rows%row_start(j)))
-               is_changed = is_changed .or. abs(mean - rows%value(k)) > 0.0_dp &
+               if (.not. is_changed) is_changed = abs(mean - rows%value(k)) > 0.0_dp &
                   .or. mean /= mean
                rows%value(k) = mean
                rows%value(m) = mean
