@@ -19,6 +19,7 @@ module emcon_kept_factor
       factor_rows_make_room, factor_rows_subtract_products, factor_rows_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
+   use emcon_memory, only : memory_factors, memory_go_on, memory_t, memory_take
    use emcon_numbering, only : numbering_t
    use emcon_projected_gradients, only : projected_begin, projected_gradients_t, projected_solve
    use emcon_solver_registry, only : solver_create
@@ -52,6 +53,7 @@ module emcon_kept_factor
       integer :: most_products = 4
       integer :: n_renewal = 0                   !! factors made so far
       integer :: n_forward = 0                   !! columns of W made so far
+      type(memory_t) :: memory                       !! of it, and of those that are not kept
       integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
       type(factor_rows_t), private :: rows           !! the constraints last taken
@@ -124,7 +126,9 @@ contains
       integer :: k
 
       self%is_made = .false.
+      call memory_go_on(self%memory)
       call blocks_analyse(self%blocks, matrix, is_new, error)
+      call memory_take(self%memory, memory_factors)
       if (allocated(error)) return
       if (.not. self%blocks%is_symmetric) return
       if (is_new) call lay_out(self, matrix)
@@ -132,6 +136,7 @@ contains
          self%diagonal(k) = matrix%value(csr_find(matrix, k, k))
       end do
       call blocks_factorise(self%blocks, matrix, is_singular, error)
+      call memory_take(self%memory, memory_factors)
       if (allocated(error)) return
       self%is_made = .not. is_singular
       if (self%is_made .and. self%blocks%is_incomplete) then
