@@ -12,8 +12,8 @@ module emcon_kept_factor
    use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_t
-   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, blocks_reach, &
-      blocks_solve, diagonal_blocks_t
+   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
+      blocks_has_panels, blocks_reach, blocks_reach_rows, blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
    use emcon_factor_rows, only : factor_rows_add, factor_rows_begin, factor_rows_fill_products, &
       factor_rows_make_room, factor_rows_subtract_products, factor_rows_t
@@ -45,6 +45,8 @@ module emcon_kept_factor
    !> And of gaps in their multipliers alone: they tell which contacts act, and with two digits they
    !> tell it wrongly too often.
    real(dp), parameter :: condensed_accuracy = 1.0e-4_dp
+   !> From so many constraints on they go through factors of dense blocks together.
+   integer, parameter :: least_panels = 200
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
@@ -315,6 +317,12 @@ contains
          if (size(self%mu) /= set%n_row) deallocate(self%mu, self%bend)
       end if
       if (.not. allocated(self%mu)) allocate(self%mu(set%n_row), self%bend(set%n_row))
+      self%n_forward = self%n_forward + set%n_row
+      if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
+         call blocks_reach_rows(self%blocks, set%gap_rows, set%n_row, self%rows%panel, error)
+         if (.not. allocated(error)) call factor_rows_fill_products(self%rows, self%y)
+         return
+      end if
       do k = 1, set%n_row
          call factor_rows_make_room(self%rows, self%rows%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
@@ -332,7 +340,6 @@ contains
          if (allocated(error)) return
          self%rows%start(k + 1) = self%rows%start(k) + n
       end do
-      self%n_forward = self%n_forward + set%n_row
       call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
 
