@@ -154,8 +154,11 @@ contains
       self%handle = emcon_cholmod_new(merge(1_c_int, 0_c_int, self%needs_halves))
       status = cholmod_out_of_memory
       if (c_associated(self%handle)) then
+         ! METIS draws from the generator of the process, which it starts anew each time.
+         !$omp critical (emcon_ordering)
          status = emcon_cholmod_analyse(self%handle, int(matrix%n_row, c_int), &
             self%scaled%row_start, self%scaled%column)
+         !$omp end critical (emcon_ordering)
       end if
       if (status == cholmod_ok) then
          call emcon_cholmod_counts(self%handle, self%n_operation, n_factor)
