@@ -13,8 +13,8 @@ A submodule stands on the .smod file of its parent, and nobody stands on a submo
 keeps there compiles one file.
 
 A comment `! build: TAG` in a source chooses flags that the Makefile keeps by that name (TAGS are
-those that it has, a blank between them): TAGGED_tag lists the files. A loop that threads share is
-the tag `threads` by itself.
+those that it has, a blank between them): TAGGED_tag lists the files. A loop that threads share, or
+what one does at a time, is the tag `threads` by itself.
 """
 
 import pathlib
@@ -27,7 +27,7 @@ SUBMODULE = re.compile(r"^\s*submodule\s*\(\s*(\w+)\s*(?::\s*(\w+)\s*)?\)\s*(\w+
 USE = re.compile(r"^\s*use\b(?:\s*,\s*non_intrinsic\s*::|\s*::)?\s*(\w+)", re.I | re.M)
 INCLUDE = re.compile(r"^\s*#?\s*include\s*[\"'<]([^\"'>]+)", re.I | re.M)
 TAG = re.compile(r"^\s*!\s*build\s*:(.*)$", re.I)
-PARALLEL = re.compile(r"^\s*!\$omp\s+parallel\b", re.I | re.M)
+PARALLEL = re.compile(r"^\s*!\$omp\s+(parallel|critical)\b", re.I | re.M)
 
 
 def defined(text):

@@ -15,9 +15,11 @@ module emcon_cholmod
    use emcon_errors, only : err_internal, error_t, raise
    use emcon_kinds, only : dp, int64, wp
    use emcon_power_scaling, only : power_of_two
+   use emcon_row_panels, only : row_panel_t
    use emcon_sparse_solver, only : matrix_definite, solver_check_square, solver_check_values, &
       solver_raise, sparse_solver_t
    use emcon_supernodal_factor, only : supernodal_factor_t, supernodal_factorise, supernodal_free
+   use emcon_supernodal_rows, only : supernodal_rows
    use emcon_supernodal_solve, only : supernodal_backward, supernodal_error, supernodal_forward, &
       supernodal_reach
    use emcon_supernodes, only : supernodes_init, supernodes_is_stack, supernodes_t
@@ -48,6 +50,8 @@ module emcon_cholmod
       procedure :: has_halves => cholmod_has_halves
       procedure :: solve_half => cholmod_solve_half
       procedure :: reach_half => cholmod_reach_half
+      procedure :: has_panels => cholmod_has_panels
+      procedure :: reach_rows => cholmod_reach_rows
       procedure :: free => cholmod_free
    end type cholmod_t
 
@@ -150,8 +154,11 @@ contains
       self%handle = emcon_cholmod_new(merge(1_c_int, 0_c_int, self%needs_halves))
       status = cholmod_out_of_memory
       if (c_associated(self%handle)) then
+         ! METIS draws from the generator of the process, which it starts anew each time.
+         !$omp critical (emcon_ordering)
          status = emcon_cholmod_analyse(self%handle, int(matrix%n_row, c_int), &
             self%scaled%row_start, self%scaled%column)
+         !$omp end critical (emcon_ordering)
       end if
       if (status == cholmod_ok) then
          call emcon_cholmod_counts(self%handle, self%n_operation, n_factor)
@@ -308,6 +315,25 @@ contains
       if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "solution", int(status), &
          status == cholmod_out_of_memory, self%scaled)
    end subroutine cholmod_solve_half
+
+   pure logical function cholmod_has_panels(self)
+      class(cholmod_t), intent(in) :: self
+
+      cholmod_has_panels = self%is_factorised .and. self%is_rough
+   end function cholmod_has_panels
+
+   subroutine cholmod_reach_rows(self, row_start, column, value, panel, error)
+      class(cholmod_t), intent(inout) :: self
+      integer, intent(in), contiguous :: row_start(:)
+      integer, intent(in), contiguous :: column(:)
+      real(dp), intent(in), contiguous :: value(:)
+      type(row_panel_t), allocatable, intent(out) :: panel(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      allocate(panel(self%nodes%n_node))
+      call supernodal_rows(self%rough, self%nodes, row_start, self%nodes%place(column + 1), value, &
+         panel)
+   end subroutine cholmod_reach_rows
 
    subroutine cholmod_reach_half(self, column, value, n_reached, index, x, error)
       class(cholmod_t), intent(inout) :: self

@@ -10,6 +10,7 @@ module emcon_chosen_solver
    use emcon_errors, only : error_t
    use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t, iterative_work
    use emcon_kinds, only : dp, wp
+   use emcon_row_panels, only : row_panel_t
    use emcon_sparse_solver, only : sparse_solver_t
    implicit none
    private
@@ -43,6 +44,8 @@ module emcon_chosen_solver
       procedure :: has_halves => chosen_has_halves
       procedure :: solve_half => chosen_solve_half
       procedure :: reach_half => chosen_reach_half
+      procedure :: has_panels => chosen_has_panels
+      procedure :: reach_rows => chosen_reach_rows
       procedure :: multiply => chosen_multiply
       procedure :: free => chosen_free
    end type chosen_solver_t
@@ -233,6 +236,23 @@ contains
 
       call self%direct%reach_half(column, value, n_reached, index, x, error)
    end subroutine chosen_reach_half
+
+   pure logical function chosen_has_panels(self)
+      class(chosen_solver_t), intent(in) :: self
+
+      chosen_has_panels = self%by == by_factors .and. self%direct%has_panels()
+   end function chosen_has_panels
+
+   subroutine chosen_reach_rows(self, row_start, column, value, panel, error)
+      class(chosen_solver_t), intent(inout) :: self
+      integer, intent(in), contiguous :: row_start(:)
+      integer, intent(in), contiguous :: column(:)
+      real(dp), intent(in), contiguous :: value(:)
+      type(row_panel_t), allocatable, intent(out) :: panel(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%direct%reach_rows(row_start, column, value, panel, error)
+   end subroutine chosen_reach_rows
 
    subroutine chosen_multiply(self, x, y, error)
       class(chosen_solver_t), intent(inout) :: self

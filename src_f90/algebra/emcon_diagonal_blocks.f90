@@ -9,12 +9,13 @@ module emcon_diagonal_blocks
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp
    use emcon_power_scaling, only : power_of_two
+   use emcon_row_panels, only : panels_append, row_panel_t
    use emcon_sort, only : sort_order
    use emcon_sparse_solver, only : sparse_solver_t
    implicit none
    private
    public :: diagonal_blocks_t, blocks_analyse, blocks_factorise, blocks_solve, blocks_reach, &
-      blocks_multiply, blocks_free
+      blocks_has_panels, blocks_reach_rows, blocks_multiply, blocks_free
 
    !> Parts of fewer than the n-th part of the unknowns are put together.
    integer, parameter :: smallest_part = 64
@@ -23,7 +24,9 @@ module emcon_diagonal_blocks
       integer :: first = 0                       !! unknowns of the blocks before it
       integer, allocatable :: unknown(:)         !! (n) ascending
       logical :: is_range = .false.              !! which follow each other
-      type(csr_t) :: matrix                      !! scale times the symmetric part
+      !> Scale times the symmetric part; without values until there is a factor, and where it is an
+      !> incomplete one: the solver has them then
+      type(csr_t) :: matrix
       integer, allocatable :: upper(:)           !! (n) work space: places in the rows
       real(dp), allocatable :: b(:), image(:)    !! (n) work space, where they do not
       class(sparse_solver_t), allocatable :: solver
@@ -216,7 +219,6 @@ contains
       end do
       m = block%matrix%row_start(n + 1)
       allocate(block%matrix%column(m), source=0)
-      allocate(block%matrix%value(m), source=0.0_dp)
       do i = 1, n
          m = block%matrix%row_start(i) - matrix%row_start(block%unknown(i))
          do k = matrix%row_start(block%unknown(i)) + 1, matrix%row_start(block%unknown(i) + 1)
@@ -288,6 +290,7 @@ contains
       block%n_factor = block%n_factor + 1
       call block%solver%factorise(block%matrix%value, block%error)
       block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
+      if (block%solver%is_incomplete) deallocate(block%matrix%value)
    end subroutine factorise
 
    !> The values of a block: entries meet those across the diagonal in the order of the rows.
@@ -299,7 +302,8 @@ contains
       real(dp) :: mean
       integer :: i, j, k, m, start
 
-      is_changed = .false.
+      is_changed = .not. allocated(block%matrix%value)
+      if (is_changed) allocate(block%matrix%value(size(block%matrix%column)))
       associate (rows => block%matrix, upper => block%upper)
          do i = 1, rows%n_row
             start = matrix%row_start(block%unknown(i)) - rows%row_start(i)
@@ -311,7 +315,7 @@ contains
                upper(j) = m + 1
                mean = scale*0.5_dp*(matrix%value(start + k) + matrix%value(m &
                   + matrix%row_start(block%unknown(j)) - rows%row_start(j)))
-               is_changed = is_changed .or. abs(mean - rows%value(k)) > 0.0_dp &
+               if (.not. is_changed) is_changed = abs(mean - rows%value(k)) > 0.0_dp &
                   .or. mean /= mean
                rows%value(k) = mean
                rows%value(m) = mean
@@ -482,6 +486,47 @@ contains
          n_reached = n_reached + n
       end do
    end subroutine blocks_reach
+
+   !> Do many right-hand sides go through the factors of all blocks together?
+   pure logical function blocks_has_panels(self)
+      type(diagonal_blocks_t), intent(in) :: self
+      integer :: b
+
+      blocks_has_panels = self%n_block > 0
+      do b = 1, self%n_block
+         if (blocks_has_panels) blocks_has_panels = self%block(b)%solver%has_panels()
+      end do
+   end function blocks_has_panels
+
+   !> L^-1 P of many sparse right-hand sides, by panels; for who has them.
+   subroutine blocks_reach_rows(self, rows, n, panel, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      type(csr_t), intent(in) :: rows            !! of unknowns
+      integer, intent(in) :: n                   !! the first ones of it
+      type(row_panel_t), allocatable, intent(out) :: panel(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(row_panel_t), allocatable :: own(:)
+      integer :: start(n + 1), local(rows%row_start(n + 1)), b, i, k, m
+      real(dp) :: part(size(local))
+
+      allocate(panel(0))
+      do b = 1, self%n_block
+         m = 0
+         do i = 1, n
+            start(i) = m
+            do k = rows%row_start(i) + 1, rows%row_start(i + 1)
+               if (self%of(rows%column(k) + 1) /= b) cycle
+               m = m + 1
+               local(m) = self%place(rows%column(k) + 1) - 1
+               part(m) = rows%value(k)
+            end do
+         end do
+         start(n + 1) = m
+         call self%block(b)%solver%reach_rows(start, local(:m), part(:m), own, error)
+         if (allocated(error)) return
+         call panels_append(panel, own, self%block(b)%first)
+      end do
+   end subroutine blocks_reach_rows
 
    !> Free what the solvers hold, and forget the pattern.
    subroutine blocks_free(self)

@@ -96,9 +96,14 @@ contains
       allocate(self%value(size(self%entry)), self%x(matrix%n_row))
       self%handle = emcon_mumps_new(int(self%symmetry, c_int))
       status = mumps_no_memory(1)
-      if (c_associated(self%handle)) status = emcon_mumps_analyse(self%handle, &
-         int(matrix%n_row, c_int), int(size(self%entry), c_int), &
-         int(row(self%entry), c_int), int(matrix%column(self%entry) + 1, c_int))
+      if (c_associated(self%handle)) then
+         ! Orderings may draw from the generator of the process.
+         !$omp critical (emcon_ordering)
+         status = emcon_mumps_analyse(self%handle, int(matrix%n_row, c_int), &
+            int(size(self%entry), c_int), int(row(self%entry), c_int), &
+            int(matrix%column(self%entry) + 1, c_int))
+         !$omp end critical (emcon_ordering)
+      end if
       self%n_analysis = self%n_analysis + 1
       ! A pattern without a full transversal is found out by its values.
       if (status < mumps_ok .and. status /= mumps_structurally_singular) call solver_raise(error, &

@@ -10,6 +10,7 @@ module emcon_sparse_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_internal, error_t, raise
    use emcon_kinds, only : dp, int64, wp
+   use emcon_row_panels, only : row_panel_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -55,6 +56,8 @@ module emcon_sparse_solver
       procedure :: has_halves
       procedure :: solve_half
       procedure :: reach_half
+      procedure :: has_panels
+      procedure :: reach_rows
       procedure :: multiply
    end type sparse_solver_t
 
@@ -131,6 +134,25 @@ contains
       n_reached = 0
       call raise(error, err_internal, "a solver without halves was asked to solve by one")
    end subroutine reach_half
+
+   !> Do many right-hand sides go through the factor that there is together? Not unless overridden.
+   pure logical function has_panels(self)
+      class(sparse_solver_t), intent(in) :: self
+
+      has_panels = .false.
+   end function has_panels
+
+   !> L^-1 P of many sparse right-hand sides, by panels of columns; for who `has_panels`.
+   subroutine reach_rows(self, row_start, column, value, panel, error)
+      class(sparse_solver_t), intent(inout) :: self
+      integer, intent(in), contiguous :: row_start(:)    !! (n + 1) entries before those of each
+      integer, intent(in), contiguous :: column(:)       !! places of the entries, from 0
+      real(dp), intent(in), contiguous :: value(:)       !! as `column`
+      type(row_panel_t), allocatable, intent(out) :: panel(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call raise(error, err_internal, "a solver without panels was asked for some")
+   end subroutine reach_rows
 
    !> y = half_scale*A x; for who `is_incomplete`.
    subroutine multiply(self, x, y, error)

@@ -157,8 +157,11 @@ contains
       call umfpack_di_free_symbolic(self%symbolic)
       self%control(control_ordering) = real(ordering, c_double)
       associate (a => self%scaled)
+         ! METIS draws from the generator of the process, which it starts anew each time.
+         !$omp critical (emcon_ordering)
          status = umfpack_di_symbolic(int(a%n_row, c_int), int(a%n_row, c_int), a%row_start, &
             a%column, a%value, self%symbolic, self%control, self%info)
+         !$omp end critical (emcon_ordering)
       end associate
    end subroutine order
 

@@ -8,6 +8,8 @@ module emcon_probe
    use emcon_kinds, only : dp, int64, wp
    use emcon_march, only : increment_t
    use emcon_march_grid, only : march_count_increments
+   use emcon_memory, only : memory_most
+   use emcon_memory_report, only : megabyte, memory_report
    use emcon_recorder, only : recorder_close, recorder_open, recorder_t, recorder_write
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_stepper, only : stepper_advance, stepper_is_done, stepper_t
@@ -23,7 +25,6 @@ module emcon_probe
    integer, parameter :: least_increments = 3
    !> With more entries of the matrix one correction alone may take longer than the probe.
    integer, parameter :: most_entries = 3000000
-   real(wp), parameter :: megabyte = 1024.0_wp**2
 
    !> What the probe has come to.
    type :: probe_t
@@ -34,6 +35,7 @@ module emcon_probe
       real(dp) :: first = 0.0_dp, last = 0.0_dp  !! of the first and of the last one [s]
       real(dp) :: spent = 0.0_dp                 !! of all [s]
       real(dp) :: ended = 0.0_dp                 !! of closing the files [s]
+      real(dp) :: files = 0.0_dp                 !! memory that the files take [byte]
    end type probe_t
 
    interface
@@ -61,10 +63,12 @@ contains
          call row_put(row, "not_predicted", n_entry(stepper), " not predicted: with # entries of " &
             // "the matrix trying an increment takes long; run a few of them")
          call rows_add(rows, row)
+         call add_memory(stepper, probe, rows)
          return
       end if
       call scratch_base(base)
       call open_files(recorder, stepper, base, has_files)
+      probe%files = recorder%memory
       call go(stepper, recorder, has_files, probe, error)
       call remove_files(recorder, base, has_files, probe%ended)
       if (probe%n > 0 .and. .not. allocated(error)) call advise_bending(stepper, rows)
@@ -80,7 +84,19 @@ contains
             "none can be written to try", "; #")
       end if
       call rows_add(rows, row)
+      call add_memory(stepper, probe, rows)
    end subroutine probe_cost
+
+   !> What takes how much memory, as far as the probe has come.
+   subroutine add_memory(stepper, probe, rows)
+      type(stepper_t), intent(in) :: stepper
+      type(probe_t), intent(in) :: probe
+      type(report_rows_t), intent(inout) :: rows
+      type(report_row_t) :: row
+
+      call memory_report(stepper, probe%files, row)
+      if (row%text /= "") call rows_add(rows, row)
+   end subroutine add_memory
 
    !> A body that the probe has bent, of elements that are too stiff for it.
    subroutine advise_bending(stepper, rows)
@@ -186,7 +202,7 @@ contains
       call row_put(row, "cpu_seconds", real(seconds, wp), " expected # s of CPU time")
       call row_put(row, "increments", count_all(stepper), " for # increments")
       call row_put(row, "newton", real(probe%n_newton, wp)/real(probe%n, wp), ", # iterations each")
-      megabytes = memory_held()
+      megabytes = real(memory_most()/megabyte, wp)
       if (megabytes > 0.0_wp) call row_put(row, "memory_megabytes", megabytes, &
          ", # MB of memory")
       associate (correction => stepper%march%newton%correction)
@@ -234,25 +250,5 @@ contains
          n = n + march_count_increments(stepper%scene%step(k))
       end do
    end function count_all
-
-   !> The most memory that the process has held so far, as Linux tells it [MB]; 0: it does not.
-   real(wp) function memory_held()
-      character(len=80) :: line
-      integer :: unit, status
-      real(wp) :: kilobytes
-
-      memory_held = 0.0_wp
-      open(newunit=unit, file="/proc/self/status", status="old", action="read", iostat=status)
-      if (status /= 0) return
-      do
-         read(unit, "(a)", iostat=status) line
-         if (status /= 0) exit
-         if (index(line, "VmHWM:") /= 1) cycle
-         read(line(len("VmHWM:") + 1:index(line, "kB") - 1), *, iostat=status) kilobytes
-         if (status == 0) memory_held = kilobytes*1024.0_wp/megabyte
-         exit
-      end do
-      close(unit)
-   end function memory_held
 
 end module emcon_probe

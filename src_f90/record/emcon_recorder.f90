@@ -9,6 +9,7 @@ module emcon_recorder
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : body_masses, ledger_momenta
    use emcon_march, only : increment_t
+   use emcon_memory, only : memory_in_use
    use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
    use emcon_pair_columns, only : pair_columns, pair_values
    use emcon_quantities, only : quantity_fields, quantity_of_field
@@ -57,6 +58,7 @@ module emcon_recorder
    integer, parameter :: cell_of_facet(2:3) = [3, 5]
 
    type :: recorder_t
+      real(dp) :: memory = 0.0_dp                !! that opening the files took [byte]
       type(vtkhdf_t) :: fields
       type(surface_recorder_t) :: surfaces       !! fields on faces of contact in space
       type(history_t) :: history
@@ -82,6 +84,7 @@ contains
       real(dp), allocatable :: mass(:)
       integer :: k
 
+      self%memory = memory_in_use()
       call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run, &
          stepper%until)
       call choose_fields(self, stepper%scene)
@@ -100,6 +103,7 @@ contains
       call define_sets(self, stepper, error)
       call body_masses(stepper%march%system, mass)
       call history_set_once(self%history, "BODIES", "MASS", [(k, k = 1, size(mass))], mass, error)
+      self%memory = memory_in_use() - self%memory
    end subroutine recorder_open
 
    !> The columns of all runs, and those of each pair of surfaces.

@@ -11,6 +11,7 @@ module emcon_run
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_lines, log_open, log_t
    use emcon_march, only : increment_t, march_watch
+   use emcon_memory_report, only : memory_report
    use emcon_newton, only : interrupt_interface
    use emcon_progress, only : progress_end, progress_show, progress_start, progress_t
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
@@ -21,7 +22,7 @@ module emcon_run
    use emcon_phases, only : n_phase, phase_eliminate, phase_gaps, phase_judge, phase_search, &
       phases_seconds, phases_start
    use emcon_probe, only : probe_cost
-   use emcon_report_row, only : report_rows_t, rows_json
+   use emcon_report_row, only : report_row_t, report_rows_t, rows_json
    use emcon_run_log, only : log_increment, log_start, model_lines
    use emcon_run_watch, only : run_watch_t
    use emcon_run_phases, only : part_march, part_output, part_read, run_parts_mark, run_parts_t, &
@@ -369,9 +370,12 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: second
       type(notes_t) :: lines, table
+      type(report_row_t) :: memory
       character(len=:), allocatable :: members
       real(dp) :: seconds(n_phase)
 
+
+      call memory_report(run%stepper, run%recorder%memory, memory)
       if (.not. allocated(error)) then
          seconds = phases_seconds(run%stepper%march%system%phases, run%parts%seconds(part_march))
          call recorder_finish(run%recorder, wall_seconds() - run%wall_start, &
@@ -388,7 +392,9 @@ contains
       call run_parts_mark(run%parts, part_output)
       call run_phases_lines(run%parts, run%stepper%march%system%phases, table)
       call log_lines(run%log, "", table)
+      if (memory%text /= "") call log_line(run%log, memory%text)
       call run_phases_json(run%parts, run%stepper%march%system%phases, members)
+      members = members // ', "memory": ' // memory%json // "}"
       call verdict_write(run%stepper%verdict, run%stepper%march, run%base // ".json", members, &
          second)
       if (.not. allocated(error)) call move_alloc(second, error)

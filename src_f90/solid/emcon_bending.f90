@@ -7,12 +7,13 @@
 !> the plane is here a part of space. Source: docs/theory.md, eq. (11h).
 module emcon_bending
    use emcon_csr, only : csr_list_users
+   use emcon_element, only : element_geometry_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_eigen
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_space, only : law_response_space, n_strain, space_response_t
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    implicit none
    private
    public :: bending_t, bending_measure
@@ -89,43 +90,41 @@ contains
       type(bending_t), intent(inout) :: self
       type(solid_t), intent(in) :: solid
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(element_geometry_t) :: geometry
       real(wp) :: slope(n_axis, n_axis)
       integer :: e, k
 
       allocate(self%center(n_axis, solid%n_element), self%slope(n_axis, n_axis, solid%n_element), &
          source=0.0_wp)
       do e = 1, solid%n_element
-         associate (geometry => solid%geometry(e))
-            self%center(:size(x, 1), e) = sum(x(:, solid%node(:geometry%n_node, e)), dim=2) &
-               /real(geometry%n_node, wp)
-            do k = 1, geometry%n_gp
-               call gradient_at(solid, e, k, u(:, solid%node(:geometry%n_node, e)), slope)
-               self%slope(:, :, e) = self%slope(:, :, e) + geometry%weight(k)*slope
-            end do
-            self%slope(:, :, e) = self%slope(:, :, e)/sum(geometry%weight)
-         end associate
+         call solid_geometry(solid, e, geometry)
+         self%center(:size(x, 1), e) = sum(x(:, solid%node(:geometry%n_node, e)), dim=2) &
+            /real(geometry%n_node, wp)
+         do k = 1, geometry%n_gp
+            call gradient_at(geometry, k, u(:, solid%node(:geometry%n_node, e)), slope)
+            self%slope(:, :, e) = self%slope(:, :, e) + geometry%weight(k)*slope
+         end do
+         self%slope(:, :, e) = self%slope(:, :, e)/sum(geometry%weight)
       end do
    end subroutine place_elements
 
-   !> d u_a / d X_b at point `k` of element `e`; around the axis of a solid of revolution u_r/r.
-   pure subroutine gradient_at(solid, e, k, u, slope)
-      type(solid_t), intent(in) :: solid
-      integer, intent(in) :: e, k
+   !> d u_a / d X_b at point `k` of an element; around the axis of a solid of revolution u_r/r.
+   pure subroutine gradient_at(geometry, k, u, slope)
+      type(element_geometry_t), intent(in) :: geometry
+      integer, intent(in) :: k                   !! 1 to n_gp
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node of the element) [L]
       real(wp), intent(out) :: slope(n_axis, n_axis)
       integer :: b, i, n
 
       n = size(u, 1)
       slope = 0.0_wp
-      associate (geometry => solid%geometry(e))
-         do i = 1, size(u, 2)
-            do b = 1, n
-               slope(:n, b) = slope(:n, b) + u(:, i)*geometry%gradient(b, i, k)
-            end do
-            if (allocated(geometry%circle)) slope(n_axis, n_axis) = slope(n_axis, n_axis) &
-               + u(1, i)*geometry%circle(i, k)
+      do i = 1, size(u, 2)
+         do b = 1, n
+            slope(:n, b) = slope(:n, b) + u(:, i)*geometry%gradient(b, i, k)
          end do
-      end associate
+         if (allocated(geometry%circle)) slope(n_axis, n_axis) = slope(n_axis, n_axis) &
+            + u(1, i)*geometry%circle(i, k)
+      end do
    end subroutine gradient_at
 
    !> Lists of the elements at each node.
@@ -183,27 +182,27 @@ contains
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
       real(wp), intent(in) :: square
       type(moduli_t), intent(in) :: moduli
+      type(element_geometry_t) :: geometry
       real(wp) :: slope(n_axis, n_axis), strain(n_strain), mean(n_strain), volume
       integer :: k
 
       energy = 0.0_wp
       mean = 0.0_wp
-      associate (geometry => solid%geometry(e))
-         volume = sum(geometry%weight)
-         do k = 1, geometry%n_gp
-            call gradient_at(solid, e, k, u(:, solid%node(:geometry%n_node, e)), slope)
-            strain = components(slope + (0.5_wp*solid%trait%square_of(e, square)) &
-               *matmul(transpose(slope), slope))
-            mean = mean + (geometry%weight(k)/volume)*strain
-            if (solid%trait%has_mean(e)) then
-               energy = energy + geometry%weight(k)*work(moduli%rest, strain)
-            else
-               energy = energy + geometry%weight(k)*work(moduli%whole, strain)
-            end if
-         end do
-         if (solid%trait%has_mean(e)) energy = energy + volume*(work(moduli%whole, mean) &
-            - work(moduli%rest, mean))
-      end associate
+      call solid_geometry(solid, e, geometry)
+      volume = sum(geometry%weight)
+      do k = 1, geometry%n_gp
+         call gradient_at(geometry, k, u(:, solid%node(:geometry%n_node, e)), slope)
+         strain = components(slope + (0.5_wp*solid%trait%square_of(e, square)) &
+            *matmul(transpose(slope), slope))
+         mean = mean + (geometry%weight(k)/volume)*strain
+         if (solid%trait%has_mean(e)) then
+            energy = energy + geometry%weight(k)*work(moduli%rest, strain)
+         else
+            energy = energy + geometry%weight(k)*work(moduli%whole, strain)
+         end if
+      end do
+      if (solid%trait%has_mean(e)) energy = energy + volume*(work(moduli%whole, mean) &
+         - work(moduli%rest, mean))
    end function strain_energy
 
    !> The symmetric part of a gradient as a strain, shears twice.
@@ -237,7 +236,7 @@ contains
 
       curve = 0.0_wp
       spread = 0.0_wp
-      do i = 1, solid%geometry(e)%n_node
+      do i = 1, solid%trait%n_node(e)
          associate (node => solid%node(i, e))
             do k = self%start(node) + 1, self%start(node + 1)
                offset = self%center(:, self%beside(k)) - self%center(:, e)
@@ -327,29 +326,29 @@ contains
       type(plate_t), intent(in) :: plate
       type(moduli_t), intent(in) :: moduli
       real(wp), intent(inout) :: missed          !! [M L^2/T^2]
-      real(wp) :: u(size(x, 1), solid%geometry(e)%n_node), height
+      real(wp) :: u(size(x, 1), solid%trait%n_node(e)), height
+      type(element_geometry_t) :: geometry
       real(wp), dimension(n_axis, n_axis) :: slope, level
       integer :: k
 
       call place_on_plate(plate, x(:, solid%node(:size(u, 2), e)), self%center(:, e), u, height)
-      associate (geometry => solid%geometry(e))
-         do k = 1, geometry%n_gp
-            call gradient_at(solid, e, k, u, slope)
-            slope = 0.5_wp*(slope + transpose(slope))
-            call relax_across(plate, moduli, slope, level)
-            if (solid%trait%has_mean(e)) then
-               missed = missed + geometry%weight(k)*(work(moduli%rest, components(slope)) &
-                  - work(moduli%whole, components(level)))
-            else
-               missed = missed + geometry%weight(k)*work(moduli%whole, components(slope - level))
-            end if
-         end do
-         if (geometry%n_gp > 1) return
-         ! One point: the strain of bending, linear over the thickness, is missing as a whole.
-         call relax_across(plate, moduli, plate%bend, level)
-         missed = missed + geometry%weight(1)*work(moduli%whole, components(level))*height &
-            /real((size(x, 1) + 1)*(size(x, 1) + 2), wp)
-      end associate
+      call solid_geometry(solid, e, geometry)
+      do k = 1, geometry%n_gp
+         call gradient_at(geometry, k, u, slope)
+         slope = 0.5_wp*(slope + transpose(slope))
+         call relax_across(plate, moduli, slope, level)
+         if (solid%trait%has_mean(e)) then
+            missed = missed + geometry%weight(k)*(work(moduli%rest, components(slope)) &
+               - work(moduli%whole, components(level)))
+         else
+            missed = missed + geometry%weight(k)*work(moduli%whole, components(slope - level))
+         end if
+      end do
+      if (geometry%n_gp > 1) return
+      ! One point: the strain of bending, linear over the thickness, is missing as a whole.
+      call relax_across(plate, moduli, plate%bend, level)
+      missed = missed + geometry%weight(1)*work(moduli%whole, components(level))*height &
+         /real((size(x, 1) + 1)*(size(x, 1) + 2), wp)
    end subroutine add_missed
 
    !> Of a strain what lies in the plane of a plate, and so much along its normal that there is no

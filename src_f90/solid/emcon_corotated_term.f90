@@ -7,11 +7,12 @@ module emcon_corotated_term
    use emcon_corotated_plane, only : corotated_energy, corotated_image, corotated_init, &
       corotated_motion_t, corotated_move, corotated_t
    use emcon_csr, only : csr_t
+   use emcon_element, only : element_geometry_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : n_lane
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    use emcon_space, only : space_t
    use emcon_stiff_elements, only : stiff_term_init, stiff_term_t
    use emcon_term, only : response_t
@@ -40,6 +41,7 @@ contains
       type(corotated_term_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: n_dim               !! > 0
+      type(element_geometry_t) :: geometry
       integer :: k, m
 
       call stiff_term_init(self, solid, n_dim, solid%trait%is_corotated)
@@ -47,7 +49,8 @@ contains
       allocate(self%frame(size(self%own%element)))
       do k = 1, size(self%frame)
          m = n_dim*self%own%n_node(k)
-         call corotated_init(self%frame(k), solid%geometry(self%own%element(k)), &
+         call solid_geometry(solid, self%own%element(k), geometry)
+         call corotated_init(self%frame(k), geometry, &
             solid%x(:, self%own%node(:self%own%n_node(k), k)))
          allocate(self%frame(k)%stiffness, source=self%own%stiffness(:m, :m, k))
       end do

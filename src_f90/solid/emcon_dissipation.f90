@@ -12,7 +12,7 @@ module emcon_dissipation
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : step_square
    use emcon_strain_rows, only : moduli_find, moduli_t, strain_count, strain_rows, &
@@ -112,7 +112,7 @@ contains
          if (.not. self%is_damped(e)) cycle
          if (self%deforms(e)) call add_element(self, e, first, motion, response, value, side)
          if (self%alpha(e) > 0.0_wp) call add_drag(self, e, first, motion, response, value, side)
-         first = first + (size(motion%du, 1)*self%solid%geometry(e)%n_node)**2
+         first = first + (size(motion%du, 1)*self%solid%trait%n_node(e))**2
       end do
    end subroutine respond
 
@@ -122,10 +122,10 @@ contains
       type(dissipation_term_t), intent(in) :: self
       integer, intent(in) :: e
       real(wp), intent(in) :: field(:, :)        !! (n_dim, n_node of the scene) [L]
-      real(wp) :: local(size(field, 1), self%solid%geometry(e)%n_node)
+      real(wp) :: local(size(field, 1), self%solid%trait%n_node(e))
       integer :: first, i
 
-      first = 1 + count([allocated(self%solid%geometry(e)%circle)])  ! a ring is no ring elsewhere
+      first = 1 + count([self%solid%is_of_rings])  ! a ring is no ring elsewhere
       do i = 1, size(local, 2)
          local(:, i) = field(:, self%solid%node(i, e))
          local(first:, i) = local(first:, i) - field(first:, self%solid%node(1, e))
@@ -139,26 +139,28 @@ contains
       type(motion_t), intent(in) :: motion
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
-      real(wp), dimension(size(motion%du, 1), self%solid%geometry(e)%n_node) :: from, by, before
+      real(wp), dimension(size(motion%du, 1), self%solid%trait%n_node(e)) :: from, by, before
       real(wp) :: force(size(by))
-      real(wp), dimension(strain_count(self%solid%geometry(e), size(motion%du, 1)), &
-         self%solid%geometry(e)%n_gp) :: strain, last, stress
+      real(wp), dimension(strain_count(self%solid%is_of_rings, size(motion%du, 1)), &
+         self%solid%trait%n_point(e)) :: strain, last, stress
       real(wp), dimension(size(strain, 1), size(by), size(strain, 2)) :: middle
+      type(element_geometry_t) :: geometry
       real(wp) :: square
       integer :: i
 
       if (.not. (motion%evaluation%dissipation > 0.0_wp .or. self%beta(e) > 0.0_wp)) return
       square = self%solid%trait%square_of(e, self%square)
+      call solid_geometry(self%solid, e, geometry)
       from = gather(self, e, motion%u0)
       by = gather(self, e, motion%du)
       last = 0.0_wp
       if (allocated(motion%du_before) .and. motion%evaluation%dissipation > 0.0_wp) then
          before = gather(self, e, motion%du_before)
-         call find_increment(self%solid%geometry(e), from - before, before, square, last)
+         call find_increment(geometry, from - before, before, square, last)
       end if
-      call find_increment(self%solid%geometry(e), from, by, square, strain)
-      call strain_rows(self%solid%geometry(e), from + 0.5_wp*by, square, middle)
-      call find_stress(self, e, motion, strain, last, stress)
+      call find_increment(geometry, from, by, square, strain)
+      call strain_rows(geometry, from + 0.5_wp*by, square, middle)
+      call find_stress(self, e, geometry%weight, motion, strain, last, stress)
       call sum_up(stress, middle, force)
       associate (total => response%part(self%role))
          do i = 1, size(by, 2)
@@ -176,9 +178,10 @@ contains
 
    !> Stresses by the scheme and by the material, with the weights of the points, and what they take
    !> over the strain increments.
-   pure subroutine find_stress(self, e, motion, strain, last, stress)
+   pure subroutine find_stress(self, e, weight, motion, strain, last, stress)
       type(dissipation_term_t), intent(inout) :: self
       integer, intent(in) :: e
+      real(wp), intent(in) :: weight(:)                      !! (n_gp) of the element [L^3]
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: strain(:, :), last(:, :)       !! (n_strain, n_gp)
       real(wp), intent(out) :: stress(:, :)                  !! (n_strain, n_gp) [M L^2/T^2]
@@ -186,7 +189,7 @@ contains
       integer :: g, n_dim
 
       n_dim = size(motion%du, 1)
-      associate (evaluation => motion%evaluation, weight => self%solid%geometry(e)%weight)
+      associate (evaluation => motion%evaluation)
          do g = 1, size(strain, 2)
             call stress_of(self%lame(e), n_dim, 0.5_wp*evaluation%dissipation*weight(g), &
                strain(:, g) - evaluation%recalled*last(:, g), numerical)
@@ -239,7 +242,7 @@ contains
       integer :: i, j, a, place, n_dim
 
       n_dim = size(f)
-      associate (node => self%solid%node(:, e), n => self%solid%geometry(e)%n_node, &
+      associate (node => self%solid%node(:, e), n => self%solid%trait%n_node(e), &
             total => response%part(self%role))
          do j = 1, n
             do i = 1, n
@@ -269,13 +272,15 @@ contains
       real(wp), intent(in), contiguous :: middle(:, :, :)    !! (n_strain, n_dim*n, n_gp)
       integer, intent(in) :: slot(:)             !! of the element, by columns
       real(dp), intent(inout), contiguous :: value(:), side(:)
-      real(wp) :: at_end(size(motion%du, 1), self%solid%geometry(e)%n_node), &
+      real(wp) :: at_end(size(motion%du, 1), self%solid%trait%n_node(e)), &
          last(size(middle, 1), size(middle, 2), size(middle, 3)), column(size(middle, 2)), &
          change(size(middle, 1), size(middle, 3)), part
+      type(element_geometry_t) :: geometry
       integer :: g, i, j, n
 
       at_end = gather(self, e, motion%u0) + gather(self, e, motion%du)
-      associate (geometry => self%solid%geometry(e), evaluation => motion%evaluation, &
+      call solid_geometry(self%solid, e, geometry)
+      associate (evaluation => motion%evaluation, &
             square => self%solid%trait%square_of(e, self%square))
          part = 0.5_wp*evaluation%dissipation + self%beta(e)*evaluation%mass_scale
          call strain_rows(geometry, at_end, square, last)

@@ -20,14 +20,14 @@ contains
 
       is_meant = .true.
       if (present(is_in)) is_meant = is_in
-      allocate(start(count(is_meant) + 1), list(n_dim*sum(solid%geometry%n_node, is_meant)))
+      allocate(start(count(is_meant) + 1), list(n_dim*sum(solid%trait%n_node, is_meant)))
       k = 0
       n = 0
       do e = 1, solid%n_element
          if (.not. is_meant(e)) cycle
          n = n + 1
          start(n) = k + 1
-         do i = 1, solid%geometry(e)%n_node
+         do i = 1, solid%trait%n_node(e)
             do a = 1, n_dim
                k = k + 1
                list(k) = n_dim*(solid%node(i, e) - 1) + a

@@ -6,22 +6,31 @@
 !> and emcon_pack_points_space.
 module emcon_element_pack
    use emcon_element, only : element_geometry_t
+   use emcon_element_space, only : n_space
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
    implicit none
    private
    public :: element_pack_t, pack_motion_t, pack_response_t
-   public :: pack_fill, pack_make_room, pack_gather, pack_scatter, pack_clear, pack_add_rounding
+   public :: pack_begin, pack_put, pack_geometry, pack_make_room, pack_gather, pack_scatter
+   public :: pack_clear, pack_add_rounding
 
    !> Elements of one kind and one law. Lanes that are left over repeat the first one.
+   !>
+   !> In space, where gradients are most of what a pack holds, they are found anew from the places
+   !> of the nodes: as fast as they are read.
    type :: element_pack_t
       integer :: n = 0                           !! elements in it, 1..n_lane
       integer :: n_node = 0                      !! nodes of each
       integer :: n_gp = 0
+      integer :: kind = 0                        !! of all of them
       integer :: law = 0                         !! of all of them
       integer :: element(n_lane) = 0
       integer, allocatable :: node(:, :)         !! (n_lane, n_node)
-      real(wp), allocatable :: gradient(:, :, :, :)   !! (n_lane, n_dim, n_node, n_gp) [1/L]
+      !> (n_lane, n_dim, n_node, n_gp) in the plane [1/L]
+      real(wp), allocatable :: gradient(:, :, :, :)
+      !> (n_lane, n_dim, n_node) in space: places of the nodes, from the first of each [L]
+      real(wp), allocatable :: x(:, :, :)
       real(wp), allocatable :: weight(:, :)      !! (n_lane, n_gp) reference volume [L^3]
       !> (n_lane, n_strain, n_mode, n_gp) as in element_geometry_t
       real(wp), allocatable :: mode(:, :, :, :), dual(:, :, :, :)
@@ -48,39 +57,78 @@ module emcon_element_pack
 
 contains
 
-   !> Take `element`, at most n_lane of one kind and one law.
-   pure subroutine pack_fill(self, element, law, node, geometry)
+   !> Room for `n` elements of one kind and one law.
+   pure subroutine pack_begin(self, n, kind, law)
       type(element_pack_t), intent(out) :: self
-      integer, intent(in) :: element(:)          !! 1..n_element
-      integer, intent(in) :: law                 !! of all of them
-      integer, intent(in) :: node(:, :)          !! (n_most, n_element)
-      type(element_geometry_t), intent(in) :: geometry(:)   !! (n_element)
-      integer :: e, l, n_dim
+      integer, intent(in) :: n                   !! 1..n_lane
+      integer, intent(in) :: kind, law           !! of all of them
 
-      self%n = size(element)
-      self%n_node = geometry(element(1))%n_node
-      self%n_gp = geometry(element(1))%n_gp
+      self%n = n
+      self%kind = kind
       self%law = law
-      allocate(self%node(n_lane, self%n_node), source=0)
-      n_dim = size(geometry(element(1))%gradient, 1)
-      allocate(self%gradient(n_lane, n_dim, self%n_node, self%n_gp), &
-         self%weight(n_lane, self%n_gp), source=0.0_wp)
-      do l = 1, n_lane
-         e = element(merge(l, 1, l <= self%n))
-         self%element(l) = e
-         self%node(l, :) = node(:self%n_node, e)
-         self%gradient(l, :, :, :) = geometry(e)%gradient
-         self%weight(l, :) = geometry(e)%weight
-         if (.not. allocated(geometry(e)%mode)) cycle
-         if (l == 1) then
-            allocate(self%mode(n_lane, size(geometry(e)%mode, 1), size(geometry(e)%mode, 2), &
-               self%n_gp), source=0.0_wp)
-            self%dual = self%mode
-         end if
-         self%mode(l, :, :, :) = geometry(e)%mode
-         self%dual(l, :, :, :) = geometry(e)%dual
+   end subroutine pack_begin
+
+   !> Let element `e` have lane `l`; the first one has those that are left over, too.
+   pure subroutine pack_put(self, l, e, node, geometry, x)
+      type(element_pack_t), intent(inout) :: self
+      integer, intent(in) :: l                   !! 1..n, 1 before others
+      integer, intent(in) :: e                   !! 1..n_element
+      integer, intent(in) :: node(:)             !! (n_node) of it
+      type(element_geometry_t), intent(in) :: geometry
+      !> (n_dim, n_node) in space: their places, from the first of them [L]
+      real(wp), intent(in), optional :: x(:, :)
+      integer :: m
+
+      if (l == 1) call make_room(self, size(geometry%gradient, 1), geometry)
+      do m = l, merge(n_lane, l, l == 1)
+         self%element(m) = e
+         self%node(m, :) = node
+         if (allocated(self%gradient)) self%gradient(m, :, :, :) = geometry%gradient
+         if (allocated(self%x)) self%x(m, :, :) = x
+         self%weight(m, :) = geometry%weight
+         if (.not. allocated(self%mode)) cycle
+         self%mode(m, :, :, :) = geometry%mode
+         self%dual(m, :, :, :) = geometry%dual
       end do
-   end subroutine pack_fill
+   end subroutine pack_put
+
+   pure subroutine make_room(self, n_dim, geometry)
+      type(element_pack_t), intent(inout) :: self
+      integer, intent(in) :: n_dim               !! > 0
+      type(element_geometry_t), intent(in) :: geometry     !! of the first one
+
+      self%n_node = geometry%n_node
+      self%n_gp = geometry%n_gp
+      allocate(self%node(n_lane, self%n_node), self%weight(n_lane, self%n_gp))
+      if (n_dim == n_space) then
+         allocate(self%x(n_lane, n_dim, self%n_node))
+      else
+         allocate(self%gradient(n_lane, n_dim, self%n_node, self%n_gp))
+      end if
+      if (.not. allocated(geometry%mode)) return
+      allocate(self%mode(n_lane, size(geometry%mode, 1), size(geometry%mode, 2), self%n_gp))
+      allocate(self%dual, mold=self%mode)
+   end subroutine make_room
+
+   !> What lane `l` has; in space gradients and volumes are to be found from `x`.
+   pure subroutine pack_geometry(self, l, geometry, x)
+      type(element_pack_t), intent(in) :: self
+      integer, intent(in) :: l                             !! 1..n
+      type(element_geometry_t), intent(out) :: geometry
+      real(wp), intent(inout), allocatable :: x(:, :)      !! (n_dim, n_node) [L], where it has them
+
+      geometry%n_node = self%n_node
+      geometry%n_gp = self%n_gp
+      if (allocated(self%gradient)) then
+         geometry%gradient = self%gradient(l, :, :, :)
+         geometry%weight = self%weight(l, :)
+      else
+         x = self%x(l, :, :)
+      end if
+      if (.not. allocated(self%mode)) return
+      geometry%mode = self%mode(l, :, :, :)
+      geometry%dual = self%dual(l, :, :, :)
+   end subroutine pack_geometry
 
    !> Work space for elements of up to `n_most` nodes.
    pure subroutine pack_make_room(n_dim, n_most, with_tangent, motion, response)

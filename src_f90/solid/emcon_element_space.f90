@@ -118,6 +118,7 @@ contains
       real(wp) :: j(n_dim, n_dim), cofactor(n_dim, n_dim)
       integer :: a, i
 
+      ! As `pack_gradient` does it, to the same bits.
       j = 0.0_wp
       do i = 2, size(x, 2)                       ! from the first node
          do a = 1, n_dim
@@ -127,9 +128,14 @@ contains
       cofactor(:, 1) = product_of(j(:, 2), j(:, 3))
       cofactor(:, 2) = product_of(j(:, 3), j(:, 1))
       cofactor(:, 3) = product_of(j(:, 1), j(:, 2))
-      det = dot_product(j(:, 1), cofactor(:, 1))
+      det = j(1, 1)*cofactor(1, 1) + j(2, 1)*cofactor(2, 1) + j(3, 1)*cofactor(3, 1)
       gradient = 0.0_wp
-      if (abs(det) > 0.0_wp) gradient = matmul(cofactor, slope)/det
+      if (.not. abs(det) > 0.0_wp) return
+      cofactor = cofactor*(1.0_wp/det)
+      do i = 1, size(x, 2)
+         gradient(:, i) = cofactor(:, 1)*slope(1, i) + cofactor(:, 2)*slope(2, i) &
+            + cofactor(:, 3)*slope(3, i)
+      end do
    end subroutine reference_gradient
 
    !> Response to a motion.

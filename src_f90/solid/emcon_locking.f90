@@ -58,7 +58,7 @@ contains
       if (.not. solid%trait%may_lock(e) .or. solid%trait%is_rigid(e)) return
       if (.not. allocated(solid%law(solid%law_of(e))%law)) return
       ratio = poisson_ratio(solid%law(solid%law_of(e))%law)
-      limit = merge(modes_limit, locking_limit, allocated(solid%geometry(e)%mode))
+      limit = merge(modes_limit, locking_limit, solid%trait%has_modes(e))
       if (.not. ratio > limit) ratio = 0.0_wp
    end function locking_ratio
 
@@ -101,8 +101,8 @@ contains
 
       n_component = sum([(a, a = 1, solid%n_dim)])
       do e = solid%n_element, 1, -1
-         if (allocated(solid%geometry(e)%circle) .or. solid%trait%is_rigid(e)) cycle
-         if (n_component*(solid%geometry(e)%n_gp + 1) < solid%n_dim*solid%geometry(e)%n_node) return
+         if (solid%is_of_rings .or. solid%trait%is_rigid(e)) cycle
+         if (n_component*(solid%trait%n_point(e) + 1) < solid%n_dim*solid%trait%n_node(e)) return
       end do
    end function strainless_element
 

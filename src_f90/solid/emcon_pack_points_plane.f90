@@ -6,7 +6,7 @@
 !> mid-configuration. Source: docs/theory.md, eqs. (6) and (11). Strains come from grad u, never
 !> from positions: a rigid offset of the scene costs no digits.
 module emcon_pack_points_plane
-   use emcon_element_pack, only : element_pack_t, pack_motion_t, pack_response_t
+   use emcon_element_pack, only : pack_motion_t, pack_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane, points_t => law_points_t
    implicit none

@@ -6,7 +6,7 @@
 !> mid-configuration. Source: docs/theory.md, eqs. (6) and (11). Strains come from grad u, never
 !> from positions: a rigid offset of the scene costs no digits.
 module emcon_pack_points_space
-   use emcon_element_pack, only : element_pack_t, pack_motion_t, pack_response_t
+   use emcon_element_pack, only : pack_motion_t, pack_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
    use emcon_law_points_space, only : points_t => law_points_space_t
@@ -18,7 +18,69 @@ module emcon_pack_points_space
    integer, parameter :: place(n_dim, n_dim) = reshape([1, 4, 6, 4, 2, 5, 6, 5, 3], [n_dim, n_dim])
    real(wp), parameter :: largest = huge(1.0_wp)**0.1_wp   ! its powers in energies are finite
 
+   public :: pack_gradient
+
    include "emcon_pack_points.inc"
+
+   !> Gradients of the functions of the nodes at a point, as `reference_gradient` of
+   !> emcon_element_space finds them, to the same bits.
+   pure subroutine pack_gradient(n, x, slope, gradient)
+      integer, intent(in) :: n                             !! nodes of each element
+      real(wp), intent(in) :: x(n_lane, n_dim, n)          !! from the first of each [L]
+      real(wp), intent(in) :: slope(n_dim, n)              !! by natural coordinates
+      real(wp), intent(out) :: gradient(n_lane, n_dim, n)  !! by X [1/L]
+      real(wp), dimension(n_lane, n_dim, n_dim) :: j, c    ! (component, by natural coordinates)
+      real(wp) :: by_volume(n_lane)
+      integer :: a, b, i, l
+
+      j = 0.0_wp
+      do i = 2, n
+         do a = 1, n_dim
+            do b = 1, n_dim
+               !$omp simd
+               do l = 1, n_lane
+                  j(l, b, a) = j(l, b, a) + x(l, b, i)*slope(a, i)
+               end do
+            end do
+         end do
+      end do
+      call find_cofactor(j(:, :, 2), j(:, :, 3), c(:, :, 1))
+      call find_cofactor(j(:, :, 3), j(:, :, 1), c(:, :, 2))
+      call find_cofactor(j(:, :, 1), j(:, :, 2), c(:, :, 3))
+      !$omp simd
+      do l = 1, n_lane
+         by_volume(l) = 1.0_wp/(j(l, 1, 1)*c(l, 1, 1) + j(l, 2, 1)*c(l, 2, 1) &
+            + j(l, 3, 1)*c(l, 3, 1))
+      end do
+      do a = 1, n_dim
+         do b = 1, n_dim
+            c(:, b, a) = c(:, b, a)*by_volume
+         end do
+      end do
+      do i = 1, n
+         do b = 1, n_dim
+            !$omp simd
+            do l = 1, n_lane
+               gradient(l, b, i) = c(l, b, 1)*slope(1, i) + c(l, b, 2)*slope(2, i) &
+                  + c(l, b, 3)*slope(3, i)
+            end do
+         end do
+      end do
+   end subroutine pack_gradient
+
+   !> Products of two vectors in each lane.
+   pure subroutine find_cofactor(a, b, c)
+      real(wp), intent(in) :: a(n_lane, n_dim), b(n_lane, n_dim)
+      real(wp), intent(out) :: c(n_lane, n_dim)
+      integer :: l
+
+      !$omp simd
+      do l = 1, n_lane
+         c(l, 1) = a(l, 2)*b(l, 3) - a(l, 3)*b(l, 2)
+         c(l, 2) = a(l, 3)*b(l, 1) - a(l, 1)*b(l, 3)
+         c(l, 3) = a(l, 1)*b(l, 2) - a(l, 2)*b(l, 1)
+      end do
+   end subroutine find_cofactor
 
    pure subroutine find_determinant(f, det)
       real(wp), intent(in) :: f(n_lane, n_dim, n_dim)

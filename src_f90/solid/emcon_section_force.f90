@@ -38,10 +38,10 @@ contains
       wrench = 0.0_wp
       do i = 1, size(element)
          own = 0.0_wp
-         do k = 1, solid%geometry(element(i))%n_node         ! corners may be one node
+         do k = 1, solid%trait%n_node(element(i))         ! corners may be one node
             if (solid%node(k, element(i)) == node(i)) own = own + force(:, k, element(i))
          end do
-         if (allocated(solid%geometry(element(i))%circle)) then
+         if (solid%is_of_rings) then
             wrench(n) = wrench(n) + own(n)       ! all else cancels around the axis
             cycle
          end if

@@ -3,6 +3,7 @@
 !>
 !> Source: docs/theory.md, section 3.
 module emcon_single_elements
+   use emcon_element, only : element_geometry_t
    use emcon_element_axial_plane, only : axial_element_respond
    use emcon_element_space, only : space_element_respond, space_motion_t, space_part_t
    use emcon_element_frequency, only : element_frequency
@@ -14,7 +15,7 @@ module emcon_single_elements
    use emcon_lumped_mass, only : lumped_mass
    use emcon_mean_volume_space, only : mean_volume_space_respond
    use emcon_motion, only : motion_t
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    use emcon_term, only : fastest_t, response_t, role_internal
    use emcon_text, only : to_text
    implicit none
@@ -88,7 +89,7 @@ contains
 
       rest%square = 0.0_wp
       call respond_to(solid, none, e, rest, .true., part)
-      associate (n => solid%geometry(e)%n_node, m => solid%n_dim)
+      associate (n => solid%trait%n_node(e), m => solid%n_dim)
          tangent = reshape(part%tangent(:m, :n, :m, :n), [m*n, m*n])
       end associate
    end subroutine single_rest_tangent
@@ -104,9 +105,9 @@ contains
       type(space_part_t), intent(inout) :: part
       integer :: i, n
 
-      associate (node => solid%node(:solid%geometry(e)%n_node, e))
+      associate (node => solid%node(:solid%trait%n_node(e), e))
          n = solid%n_dim
-         if (allocated(solid%geometry(e)%circle)) then
+         if (solid%is_of_rings) then
             local%from(:n, :size(node)) = motion%from(:, node)
             local%by(:n, :size(node)) = motion%by(:, node)
          else
@@ -127,23 +128,42 @@ contains
       type(space_motion_t), intent(in) :: local
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(space_part_t), intent(inout) :: part
+      type(element_geometry_t) :: geometry
+
+      if (solid%held%at(e) < 0) then             ! without a copy
+         call respond_with(solid, user, e, solid%held%single(-solid%held%at(e)), local, &
+            with_tangent, part)
+      else
+         call solid_geometry(solid, e, geometry)
+         call respond_with(solid, user, e, geometry, local, with_tangent, part)
+      end if
+   end subroutine respond_to
+
+   !> The same, of an element with this geometry.
+   pure subroutine respond_with(solid, user, e, geometry, local, with_tangent, part)
+      type(solid_t), intent(in) :: solid
+      type(host_response_t), intent(in) :: user !! of the same motion
+      integer, intent(in) :: e                   !! 1..n_element
+      type(element_geometry_t), intent(in) :: geometry
+      type(space_motion_t), intent(in) :: local
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(space_part_t), intent(inout) :: part
 
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
          if (solid%host%first_point(e) > 0) then
-            call user_space_respond(solid%geometry(e), solid%host%first_point(e), &
+            call user_space_respond(geometry, solid%host%first_point(e), &
                user%points(solid%law_of(e)), local, with_tangent, part)
-         else if (allocated(solid%geometry(e)%circle)) then
-            call axial_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
+         else if (solid%is_of_rings) then
+            call axial_element_respond(geometry, law%law, local, with_tangent, part)
          else if (solid%trait%has_mean(e)) then
-            call mean_volume_space_respond(solid%geometry(e), law%law, rest%law, local, &
-               with_tangent, part)
-         else if (allocated(solid%geometry(e)%mode)) then
-            call incompatible_space_respond(solid%geometry(e), law%law, local, with_tangent, part)
+            call mean_volume_space_respond(geometry, law%law, rest%law, local, with_tangent, part)
+         else if (allocated(geometry%mode)) then
+            call incompatible_space_respond(geometry, law%law, local, with_tangent, part)
          else
-            call space_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
+            call space_element_respond(geometry, law%law, local, with_tangent, part)
          end if
       end associate
-   end subroutine respond_to
+   end subroutine respond_with
 
    !> Add the forces of element `e`, with what its displacements are rounded by.
    subroutine add_forces(solid, e, motion, local, part, response)
@@ -156,7 +176,7 @@ contains
       real(wp) :: largest
       integer :: a, i
 
-      associate (node => solid%node(:solid%geometry(e)%n_node, e), &
+      associate (node => solid%node(:solid%trait%n_node(e), e), &
             total => response%part(role_internal))
          do i = 1, size(node)
             total%force(:, node(i)) = total%force(:, node(i)) + part%force(:solid%n_dim, i)
@@ -186,14 +206,14 @@ contains
       real(wp), intent(in) :: factor             !! of the tangent
       type(space_part_t), intent(in) :: part
       real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
-      integer :: slot((solid%n_dim*solid%geometry(e)%n_node)**2)
+      integer :: slot((solid%n_dim*solid%trait%n_node(e))**2)
       integer :: a, c, i, j, k, place
 
-      call element_places_find(slots, e, solid%geometry(e)%n_node, slot)
+      call element_places_find(slots, e, solid%trait%n_node(e), slot)
       k = 0
-      do j = 1, solid%geometry(e)%n_node
+      do j = 1, solid%trait%n_node(e)
          do c = 1, solid%n_dim
-            do i = 1, solid%geometry(e)%n_node
+            do i = 1, solid%trait%n_node(e)
                do a = 1, solid%n_dim
                   k = k + 1
                   place = slot(k)
@@ -222,7 +242,7 @@ contains
 
       local%square = user%square
       do e = 1, solid%n_element
-         associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         associate (node => solid%node(:solid%trait%n_node(e), e))
             if (.not. (is_here(solid, e) .and. any(abs(direction(:, node)) > 0.0_wp))) cycle
             call respond_at(solid, user, e, motion, .true., local, part)
             if (part%is_inverted) return
@@ -253,7 +273,7 @@ contains
          if (.not. is_here(solid, e)) cycle
          call respond_at(solid, user, e, motion, .true., local, part)
          if (part%is_inverted) return
-         associate (n => solid%geometry(e)%n_node, m => solid%n_dim)
+         associate (n => solid%trait%n_node(e), m => solid%n_dim)
             call compare_frequency(solid, e, motion%weight, part%tangent(:m, :n, :m, :n), &
                fastest)
          end associate

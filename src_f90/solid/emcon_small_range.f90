@@ -5,10 +5,11 @@
 !> that of the symmetric part; of corotated elements both are in their frames.
 module emcon_small_range
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t
+   use emcon_element, only : element_geometry_t
    use emcon_kinds, only : wp
    use emcon_small_widen_plane, only : small_widen_plane => small_widen
    use emcon_small_widen_space, only : small_widen_space => small_widen
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    implicit none
    private
    public :: small_range_t, small_range_init, small_range_widen, small_limit
@@ -30,6 +31,7 @@ contains
    pure subroutine small_range_init(self, solid)
       type(small_range_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
+      type(element_geometry_t) :: geometry
       integer :: i, most
 
       most = maxval(solid%deck%section)
@@ -40,10 +42,9 @@ contains
       allocate(self%frame(solid%n_element))
       do i = 1, solid%n_element
          if (.not. solid%trait%is_corotated(i)) cycle
-         associate (geometry => solid%geometry(i))
-            call corotated_init(self%frame(i), geometry, &
-               solid%x(:, solid%node(:geometry%n_node, i)))
-         end associate
+         call solid_geometry(solid, i, geometry)
+         call corotated_init(self%frame(i), geometry, &
+            solid%x(:, solid%node(:geometry%n_node, i)))
       end do
    end subroutine small_range_init
 
@@ -55,6 +56,7 @@ contains
       real(wp), dimension(size(u, 1), size(solid%node, 1)) :: own, left
       real(wp), dimension(size(self%section)) :: rotation, strain   ! squares
       real(wp) :: turn(size(u, 1), size(u, 1))
+      type(element_geometry_t) :: geometry
       integer :: e, i, s
 
       rotation = 0.0_wp
@@ -62,7 +64,8 @@ contains
       do e = 1, solid%n_element
          if (.not. solid%trait%is_small(e)) cycle
          s = findloc(self%section, solid%deck%section(e), 1)
-         associate (geometry => solid%geometry(e), node => solid%node(:, e))
+         call solid_geometry(solid, e, geometry)
+         associate (node => solid%node(:, e))
             do i = 1, geometry%n_node
                own(:, i) = u(:, node(i)) - u(:, node(1))
             end do

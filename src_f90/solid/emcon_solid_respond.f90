@@ -3,8 +3,9 @@
 !>
 !> Source: docs/theory.md, eqs. (6) and (11).
 module emcon_solid_respond
-   use emcon_element_pack, only : element_pack_t, pack_clear, pack_fill, pack_make_room, &
-      pack_motion_t, pack_response_t
+   use emcon_element_pack, only : element_pack_t, pack_begin, pack_clear, pack_make_room, &
+      pack_motion_t, pack_put, pack_response_t
+   use emcon_element, only : element_geometry_t
    use emcon_element_plane, only : element_motion_t, element_point, element_response_t, &
       point_is_regular, point_motion_t
    use emcon_element_space, only : n_space, space_motion_t
@@ -19,10 +20,10 @@ module emcon_solid_respond
    use emcon_mean_volume_plane, only : mean_volume_respond
    use emcon_pack_points_plane, only : pack_add_point, pack_point, pack_point_check, pack_point_t
    use emcon_pack_points_space, only : add_point_space => pack_add_point, &
-      point_space => pack_point, point_check_space => pack_point_check, &
+      pack_gradient, point_space => pack_point, point_check_space => pack_point_check, &
       point_space_t => pack_point_t
    use emcon_point_function, only : point_gradient, point_ok
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    implicit none
    private
    public :: solid_element_respond, solid_pack_respond, solid_evaluate_user, solid_gather
@@ -56,16 +57,17 @@ contains
       integer :: k
 
       if (allocated(pack%mode)) then
-         call incompatible_respond(pack, self%law(pack%law)%law, motion, with_tangent, part)
+         call incompatible_respond(pack, pack%gradient, self%law(pack%law)%law, motion, &
+            with_tangent, part)
          return
       else if (self%trait%has_mean(pack%element(1))) then
-         call mean_volume_respond(pack, self%law(pack%law)%law, self%rest(pack%law)%law, motion, &
-            with_tangent, part)
+         call mean_volume_respond(pack, pack%gradient, self%law(pack%law)%law, &
+            self%rest(pack%law)%law, motion, with_tangent, part)
          return
       end if
       call pack_clear(pack%n_node, part, with_tangent)
       do k = 1, pack%n_gp
-         call pack_point(pack, k, motion, point)
+         call pack_point(pack%n_node, pack%gradient(:, :, :, k), motion, point)
          if (self%host%first_point(pack%element(1)) > 0) then
             call host_answer(user%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
                point%law%energy, point%law%stress, point%law%tangent)
@@ -75,7 +77,8 @@ contains
                call law%respond(point%law, with_tangent)
             end associate
          end if
-         call pack_add_point(pack, k, point, with_tangent, part)
+         call pack_add_point(pack%n_node, pack%gradient(:, :, :, k), pack%weight(:, k), point, &
+            with_tangent, part)
       end do
    end subroutine pack_respond_plane
 
@@ -87,19 +90,18 @@ contains
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(pack_response_t), intent(inout) :: part
       type(point_space_t) :: point
+      real(wp) :: gradient(n_lane, n_space, pack%n_node)
       integer :: k
 
-      if (allocated(pack%mode)) then
-         call incompatible_respond_space(pack, self%law(pack%law)%law, motion, with_tangent, part)
-         return
-      else if (self%trait%has_mean(pack%element(1))) then
-         call mean_volume_respond_space(pack, self%law(pack%law)%law, self%rest(pack%law)%law, &
-            motion, with_tangent, part)
+      if (allocated(pack%mode) .or. self%trait%has_mean(pack%element(1))) then
+         call pack_respond_whole(self, pack, motion, with_tangent, part)
          return
       end if
       call pack_clear(pack%n_node, part, with_tangent)
       do k = 1, pack%n_gp
-         call point_space(pack, k, motion, point)
+         call pack_gradient(pack%n_node, pack%x, self%shape(pack%kind)%table%slope(:, :, k), &
+            gradient)
+         call point_space(pack%n_node, gradient, motion, point)
          if (self%host%first_point(pack%element(1)) > 0) then
             call host_answer(user%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
                point%law%energy, point%law%stress, point%law%tangent)
@@ -109,11 +111,34 @@ contains
                call law_respond_points_space(law, point%law, with_tangent)
             end associate
          end if
-         call add_point_space(pack, k, point, with_tangent, part)
+         call add_point_space(pack%n_node, gradient, pack%weight(:, k), point, with_tangent, part)
       end do
    end subroutine pack_respond_space
 
-   !> Response of element `e` alone.
+   !> The same of elements whose points answer together.
+   pure subroutine pack_respond_whole(self, pack, motion, with_tangent, part)
+      type(solid_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      type(pack_motion_t), intent(in) :: motion
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(pack_response_t), intent(inout) :: part
+      real(wp) :: gradient(n_lane, n_space, pack%n_node, pack%n_gp)
+      integer :: k
+
+      do k = 1, pack%n_gp
+         call pack_gradient(pack%n_node, pack%x, self%shape(pack%kind)%table%slope(:, :, k), &
+            gradient(:, :, :, k))
+      end do
+      if (allocated(pack%mode)) then
+         call incompatible_respond_space(pack, gradient, self%law(pack%law)%law, motion, &
+            with_tangent, part)
+      else
+         call mean_volume_respond_space(pack, gradient, self%law(pack%law)%law, &
+            self%rest(pack%law)%law, motion, with_tangent, part)
+      end if
+   end subroutine pack_respond_whole
+
+   !> Response of element `e` of the plane alone.
    pure subroutine solid_element_respond(self, e, motion, user, with_tangent, part)
       type(solid_t), intent(in) :: self
       integer, intent(in) :: e                   !! 1 to n_element
@@ -124,9 +149,12 @@ contains
       type(element_pack_t) :: pack
       type(pack_motion_t) :: motions
       type(pack_response_t) :: parts
+      type(element_geometry_t) :: geometry
       integer :: i, n
 
-      call pack_fill(pack, [e], self%law_of(e), self%node, self%geometry)
+      call solid_geometry(self, e, geometry)
+      call pack_begin(pack, 1, self%kind(e), self%law_of(e))
+      call pack_put(pack, 1, e, self%node(:geometry%n_node, e), geometry)
       motions%square = motion%square
       n = pack%n_node
       call pack_make_room(self%n_dim, n, with_tangent, motions, parts)
@@ -194,16 +222,18 @@ contains
       type(host_response_t), intent(inout) :: user
       type(element_motion_t) :: local
       type(point_motion_t) :: point
+      type(element_geometry_t) :: geometry
       integer :: e, i, k
 
       user%inverted_element = 0
       local%square = user%square
       do e = 1, self%n_element
          if (self%host%first_point(e) == 0) cycle
-         call solid_gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
-         do k = 1, self%geometry(e)%n_gp
+         call solid_geometry(self, e, geometry)
+         call solid_gather(self%node(:geometry%n_node, e), u0, du, local)
+         do k = 1, geometry%n_gp
             i = self%host%first_point(e) - 1 + k
-            call element_point(self%geometry(e), k, local, point)
+            call element_point(geometry, k, local, point)
             associate (points => user%points(self%law_of(e)))
                points%strain(:, i) = point%strain
                points%dstrain(:, i) = point%dstrain
@@ -222,6 +252,7 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (3, n_node)
       type(host_response_t), intent(inout) :: user
       type(space_motion_t) :: local
+      type(element_geometry_t) :: geometry
       logical :: is_inverted
       integer :: e, i
 
@@ -229,13 +260,14 @@ contains
       local%square = user%square
       do e = 1, self%n_element
          if (self%host%first_point(e) == 0) cycle
-         associate (node => self%node(:self%geometry(e)%n_node, e))
+         call solid_geometry(self, e, geometry)
+         associate (node => self%node(:geometry%n_node, e))
             do i = 1, size(node)
                local%from(:, i) = u0(:, node(i)) - u0(:, node(1))
                local%by(:, i) = du(:, node(i)) - du(:, node(1))
             end do
          end associate
-         call user_space_strain(self%geometry(e), self%host%first_point(e), local, &
+         call user_space_strain(geometry, self%host%first_point(e), local, &
             user%points(self%law_of(e)), is_inverted)
          if (.not. is_inverted) cycle
          user%inverted_element = e

@@ -98,7 +98,7 @@ contains
 
       self%square = step_square(scene%step(i_step))
       self%user%square = self%square
-      call element_places_init(self%to, size(scene%x, 1), merge(0, self%solid%geometry%n_node, &
+      call element_places_init(self%to, size(scene%x, 1), merge(0, self%solid%trait%n_node, &
          self%solid%trait%is_small), slot)
    end subroutine begin_step
 
@@ -405,7 +405,7 @@ contains
       integer :: e, i
 
       do e = 1, self%solid%n_element
-         do i = 1, self%solid%geometry(e)%n_node
+         do i = 1, self%solid%trait%n_node(e)
             associate (node => self%solid%node(i, e))
                stiffness(node) = stiffness(node) + self%solid%stiffness(i, e)
             end associate

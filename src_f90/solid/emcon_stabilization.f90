@@ -13,7 +13,7 @@ module emcon_stabilization
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : step_square
    use emcon_strain_rows, only : moduli_find, moduli_t, n_shear, shear_one, shear_other, &
@@ -78,16 +78,16 @@ contains
    pure real(wp) function given_modulus(solid, e) result(modulus)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e                   !! 1..n_element
+      type(element_geometry_t) :: geometry
       real(wp) :: spread
       integer :: g
 
       spread = 0.0_wp
-      associate (geometry => solid%geometry(e))
-         do g = 1, geometry%n_gp
-            spread = spread + geometry%weight(g)*sum(abs(geometry%gradient(:, :, g))) &
-               *sum(abs(geometry%gradient(:, 1, g)))
-         end do
-      end associate
+      call solid_geometry(solid, e, geometry)
+      do g = 1, geometry%n_gp
+         spread = spread + geometry%weight(g)*sum(abs(geometry%gradient(:, :, g))) &
+            *sum(abs(geometry%gradient(:, 1, g)))
+      end do
       modulus = 2.0_wp*solid%stiffness(1, e)/spread    ! by the end of no step
    end function given_modulus
 
@@ -133,6 +133,7 @@ contains
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       type(element_part_t) :: part
+      type(element_geometry_t) :: geometry
       real(wp) :: drag
       integer :: e, first, i, m
 
@@ -144,9 +145,10 @@ contains
       associate (total => response%part(self%role))
          do e = 1, self%solid%n_element
             if (.not. self%acts(e)) cycle
-            associate (node => self%solid%node(:self%solid%geometry(e)%n_node, e))
-               call find_part(self, e, motion, present(value), part)
-               call add_drag(self%solid%geometry(e), drag/motion%evaluation%lapse, &
+            associate (node => self%solid%node(:self%solid%trait%n_node(e), e))
+               call solid_geometry(self%solid, e, geometry)
+               call find_part(self, e, geometry, motion, present(value), part)
+               call add_drag(geometry, drag/motion%evaluation%lapse, &
                   motion%du(:, node), present(value), part)
                m = size(motion%du, 1)
                do i = 1, size(node)
@@ -191,6 +193,7 @@ contains
       real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
       type(element_part_t) :: part
+      type(element_geometry_t) :: geometry
       real(wp) :: drag
       integer :: e
 
@@ -198,9 +201,10 @@ contains
       drag = drag_of(self, motion%u0)
       do e = 1, self%solid%n_element
          if (.not. self%acts(e)) cycle
-         associate (node => self%solid%node(:self%solid%geometry(e)%n_node, e))
-            call find_part(self, e, motion, .true., part)
-            call add_drag(self%solid%geometry(e), drag/motion%evaluation%lapse, &
+         associate (node => self%solid%node(:self%solid%trait%n_node(e), e))
+            call solid_geometry(self%solid, e, geometry)
+            call find_part(self, e, geometry, motion, .true., part)
+            call add_drag(geometry, drag/motion%evaluation%lapse, &
                motion%du(:, node), .true., part)
             product(:, node) = product(:, node) + reshape(matmul(part%tangent, &
                reshape(direction(:, node), [size(part%force)])), [size(direction, 1), size(node)])
@@ -222,6 +226,7 @@ contains
    pure real(wp) function drag_of(self, u) result(drag)
       type(stabilization_term_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u(:, :)          !! (n_dim, n_node) [L]
+      type(element_geometry_t) :: geometry
       real(wp), allocatable :: strain(:, :), stress(:)
       real(wp) :: stored, moved                  ! 2 W, and the square of u over the volume
       integer :: e, g
@@ -230,9 +235,9 @@ contains
       moved = 0.0_wp
       do e = 1, self%solid%n_element
          if (.not. self%acts(e)) cycle
-         associate (geometry => self%solid%geometry(e), &
-               node => self%solid%node(:self%solid%geometry(e)%n_node, e))
-            call find_strain(self, e, 0.0_wp*u(:, node), u(:, node), strain)
+         call solid_geometry(self%solid, e, geometry)
+         associate (node => self%solid%node(:geometry%n_node, e))
+            call find_strain(self, e, geometry, 0.0_wp*u(:, node), u(:, node), strain)
             do g = 1, geometry%n_gp
                stress = strain(:, g)
                call stress_of(self%lame(e), size(u, 1), 1.0_wp, strain(:, g), stress)
@@ -266,15 +271,15 @@ contains
 
    !> Strains of element `e` at its points over the way `by` from the displacements `from`; what
    !> incompatible modes take is left out.
-   pure subroutine find_strain(self, e, from, by, strain)
+   pure subroutine find_strain(self, e, geometry, from, by, strain)
       type(stabilization_term_t), intent(in) :: self
       integer, intent(in) :: e
+      type(element_geometry_t), intent(in) :: geometry     !! of the element
       real(wp), intent(in), contiguous :: from(:, :)       !! (n_dim, n_node of the element) [L]
       real(wp), intent(in), contiguous :: by(:, :)         !! as `from` [L]
       real(wp), allocatable, intent(out) :: strain(:, :)   !! (n_strain, n_gp) as of `strain_rows`
 
-      associate (geometry => self%solid%geometry(e), &
-            n => strain_count(self%solid%geometry(e), size(by, 1)), &
+      associate (n => strain_count(self%solid%is_of_rings, size(by, 1)), &
             square => self%solid%trait%square_of(e, self%square))
          allocate(strain(n, geometry%n_gp))
          call strain_change(geometry, from + 0.5_wp*by, by, square, strain)
@@ -283,9 +288,10 @@ contains
    end subroutine find_strain
 
    !> Force and tangent of element `e`: derivatives by the end of 1/2 (lapse/h) int dE.C dE.
-   pure subroutine find_part(self, e, motion, with_tangent, part)
+   pure subroutine find_part(self, e, geometry, motion, with_tangent, part)
       type(stabilization_term_t), intent(in) :: self
       integer, intent(in) :: e
+      type(element_geometry_t), intent(in) :: geometry     !! of the element
       type(motion_t), intent(in) :: motion
       logical, intent(in) :: with_tangent        !! else the tangent is not made
       type(element_part_t), intent(inout) :: part
@@ -293,13 +299,12 @@ contains
       real(wp) :: factor
       integer :: g
 
-      associate (geometry => self%solid%geometry(e), n => size(motion%du, 1) &
-            *self%solid%geometry(e)%n_node, node => self%solid%node( &
-            :self%solid%geometry(e)%n_node, e), &
+      associate (n => size(motion%du, 1)*geometry%n_node, &
+            node => self%solid%node(:geometry%n_node, e), &
             square => self%solid%trait%square_of(e, self%square))
          allocate(from, source=motion%u0(:, node))
          allocate(by, source=motion%du(:, node))
-         call find_strain(self, e, from, by, strain)
+         call find_strain(self, e, geometry, from, by, strain)
          allocate(last(size(strain, 1), n, geometry%n_gp), stress(size(strain, 1)))
          call strain_rows(geometry, from + by, square, last)
          part%force = spread(0.0_wp, 1, n)

@@ -79,7 +79,7 @@ contains
       integer :: k, m
 
       self%element = pack([(k, k = 1, solid%n_element)], is_in)
-      self%n_node = solid%geometry(self%element)%n_node
+      self%n_node = solid%trait%n_node(self%element)
       self%node = solid%node(:, self%element)
       self%rounding = solid%stiffness(:, self%element)
       call element_lists(solid, n_dim, self%start, self%freedom, is_in)

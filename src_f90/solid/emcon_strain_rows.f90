@@ -47,11 +47,11 @@ contains
    end function n_shear
 
    !> Components of strain at the points of an element.
-   pure integer function strain_count(geometry, n_dim) result(n)
-      type(element_geometry_t), intent(in) :: geometry
+   pure integer function strain_count(is_of_rings, n_dim) result(n)
+      logical, intent(in) :: is_of_rings         !! of solids of revolution
       integer, intent(in) :: n_dim               !! of the model
 
-      n = n_dim + n_shear(n_dim) + count([allocated(geometry%circle)])
+      n = n_dim + n_shear(n_dim) + count([is_of_rings])
    end function strain_count
 
    !> The strains at the points by the components of displacements, node by node, about the

@@ -21,7 +21,7 @@ module emcon_stress
    use emcon_mean_volume_space, only : mean_volume_space_hold
    use emcon_push_forward_plane, only : push_forward
    use emcon_rotation, only : cross_product
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_geometry, solid_t
    use emcon_solid_respond, only : solid_evaluate_user
    implicit none
    private
@@ -44,7 +44,7 @@ contains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
       type(host_response_t) :: user
       integer :: count_at(solid%n_node), e, i, k, node
-      real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: at_gp, strain
+      real(wp), dimension(6, maxval(solid%trait%n_point)) :: at_gp, strain
 
       call respond_at(solid, u, square, user)
       stress = 0.0_wp
@@ -52,14 +52,14 @@ contains
       do e = 1, solid%n_element
          if (solid%trait%is_rigid(e)) cycle
          call state_of(solid, e, u, square, user, at_gp, strain)
-         do k = 1, solid%geometry(e)%n_gp
-            do i = 1, solid%geometry(e)%n_node
+         do k = 1, solid%trait%n_point(e)
+            do i = 1, solid%trait%n_node(e)
                node = solid%node(i, e)
                stress(:, node) = stress(:, node) &
-                  + solid%to_nodes(solid%kind(e))%weight(k, i)*at_gp(:, k)
+                  + solid%shape(solid%kind(e))%to_nodes(k, i)*at_gp(:, k)
             end do
          end do
-         do i = 1, solid%geometry(e)%n_node
+         do i = 1, solid%trait%n_node(e)
             count_at(solid%node(i, e)) = count_at(solid%node(i, e)) + 1
          end do
       end do
@@ -89,7 +89,7 @@ contains
       call place(solid, e, u, motion, turn)
       call element_state(solid, e, motion, user, points, stress, strain)
       if (.not. solid%trait%is_corotated(e)) return
-      do k = 1, solid%geometry(e)%n_gp
+      do k = 1, solid%trait%n_point(e)
          call corotated_turn_stress(turn, stress(:, k))
       end do
    end subroutine state_of
@@ -102,14 +102,16 @@ contains
       type(host_response_t), intent(in) :: user
       real(wp), intent(inout) :: stress(:, :), strain(:, :)
       type(space_motion_t) :: motion
+      type(element_geometry_t) :: geometry
       integer :: i
 
       motion%square = merge(0.0_wp, square, solid%trait%is_small(e))
-      associate (node => solid%node(:solid%geometry(e)%n_node, e))
-         if (allocated(solid%geometry(e)%circle)) then
+      call solid_geometry(solid, e, geometry)
+      associate (node => solid%node(:solid%trait%n_node(e), e))
+         if (solid%is_of_rings) then
             motion%from(:size(u, 1), :size(node)) = u(:, node)
-            call axial_element_hold(solid%geometry(e), solid%law(solid%law_of(e))%law, motion, &
-               stress, strain)
+            call axial_element_hold(geometry, solid%law(solid%law_of(e))%law, motion, stress, &
+               strain)
             return
          end if
          do i = 1, size(node)
@@ -118,13 +120,12 @@ contains
       end associate
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
          if (solid%host%first_point(e) > 0) then
-            call user_space_hold(solid%geometry(e), merge(solid%host%first_point(e), 0, &
+            call user_space_hold(geometry, merge(solid%host%first_point(e), 0, &
                user%inverted_element == 0), user%points(solid%law_of(e)), motion, stress, strain)
          else if (solid%trait%has_mean(e)) then
-            call mean_volume_space_hold(solid%geometry(e), law%law, rest%law, motion, stress, &
-               strain)
+            call mean_volume_space_hold(geometry, law%law, rest%law, motion, stress, strain)
          else
-            call space_element_hold(solid%geometry(e), law%law, motion, stress, strain)
+            call space_element_hold(geometry, law%law, motion, stress, strain)
          end if
       end associate
    end subroutine state_of_single
@@ -153,7 +154,7 @@ contains
       real(wp), intent(inout) :: turn(:, :)              !! set for corotated elements
       integer :: i
 
-      do i = 1, solid%geometry(e)%n_node
+      do i = 1, solid%trait%n_node(e)
          motion%from(:, i) = u(:, solid%node(i, e))
       end do
       if (solid%trait%is_corotated(e)) call place_in_frame(solid, e, u, motion, turn)
@@ -166,11 +167,13 @@ contains
       type(element_motion_t), intent(inout) :: motion
       real(wp), intent(inout) :: turn(:, :)
       type(corotated_t) :: frame
+      type(element_geometry_t) :: geometry
       real(wp) :: u_left(size(u, 1), size(solid%node, 1))
       integer :: i
 
-      associate (node => solid%node(:solid%geometry(e)%n_node, e))
-         call corotated_init(frame, solid%geometry(e), solid%x(:, node))
+      associate (node => solid%node(:solid%trait%n_node(e), e))
+         call solid_geometry(solid, e, geometry)
+         call corotated_init(frame, geometry, solid%x(:, node))
          do i = 1, size(node)
             u_left(:, i) = u(:, node(i)) - u(:, node(1))
          end do
@@ -188,21 +191,23 @@ contains
       type(law_points_t), intent(inout) :: points        !! workspace, as it was made
       real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 4, n_gp), and room
       type(point_motion_t) :: point
+      type(element_geometry_t) :: geometry
       real(wp) :: f(size(motion%from, 1), size(motion%from, 1), n_lane)
       integer :: before, l, n
 
-      do before = 0, solid%geometry(e)%n_gp - 1, n_lane
-         n = min(n_lane, solid%geometry(e)%n_gp - before)
+      call solid_geometry(solid, e, geometry)
+      do before = 0, geometry%n_gp - 1, n_lane
+         n = min(n_lane, geometry%n_gp - before)
          do l = 1, n
-            call element_point(solid%geometry(e), before + l, motion, point)
+            call element_point(geometry, before + l, motion, point)
             strain(:3, before + l) = point%strain
             f(:, :, l) = point%f_end
          end do
-         if (allocated(solid%geometry(e)%mode)) call modes_relax(solid%geometry(e), strain(:3, :n))
+         if (allocated(geometry%mode)) call modes_relax(geometry, strain(:3, :n))
          points%strain(:n, :) = transpose(strain(:3, before + 1:before + n))
          if (solid%trait%has_mean(e)) then
             call mean_volume_hold(solid%law(solid%law_of(e))%law, solid%rest(solid%law_of(e))%law, &
-               solid%geometry(e)%weight, points)
+               geometry%weight, points)
          else if (solid%host%first_point(e) == 0) then
             call solid%law(solid%law_of(e))%law%hold(points)
          else
@@ -245,7 +250,8 @@ contains
       real(wp), intent(out) :: strain(:, :)
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
       type(host_response_t) :: user
-      real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: stress_k, strain_k
+      real(wp), dimension(6, maxval(solid%trait%n_point)) :: stress_k, strain_k
+      type(element_geometry_t) :: geometry
       real(wp) :: weight
       integer :: e, k
 
@@ -253,11 +259,12 @@ contains
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
-         volume(e) = sum(solid%geometry(e)%weight)
+         call solid_geometry(solid, e, geometry)
+         volume(e) = sum(geometry%weight)
          if (solid%trait%is_rigid(e)) cycle
          call state_of(solid, e, u, square, user, stress_k, strain_k)
-         do k = 1, solid%geometry(e)%n_gp
-            weight = solid%geometry(e)%weight(k)/volume(e)
+         do k = 1, solid%trait%n_point(e)
+            weight = geometry%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k(:, k)
             strain(:, e) = strain(:, e) + weight*strain_k(:size(strain, 1), k)
          end do
@@ -273,7 +280,8 @@ contains
       logical, intent(in) :: is_used(:)          !! (n_element) those that are asked for
       real(wp), intent(out) :: force(:, :, :)    !! (n_dim, n_most, n_element) [M L/T^2]
       type(host_response_t) :: user
-      real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: stress, strain
+      type(element_geometry_t) :: geometry
+      real(wp), dimension(6, maxval(solid%trait%n_point)) :: stress, strain
       real(wp) :: f(n_space, n_space, size(stress, 2)), s(n_space, n_space)
       integer :: e, k, n
 
@@ -283,20 +291,19 @@ contains
       do e = 1, solid%n_element
          if (solid%trait%is_rigid(e) .or. .not. is_used(e)) cycle
          call state_of(solid, e, u, square, user, stress, strain)
-         associate (geometry => solid%geometry(e))
-            do k = 1, geometry%n_gp
-               call find_deformation(solid, e, k, u, square, f(:, :, k))
-               if (n < n_space .and. square > 0.0_wp) f(n_space, n_space, k) &
-                  = sqrt(1.0_wp + 2.0_wp*strain(across, k))
-               call pull_back(f(:, :, k), stress(:, k))
-            end do
-            if (allocated(geometry%mode)) call return_modes(geometry, n, stress)
-            do k = 1, geometry%n_gp
-               s = reshape(stress([place_of], k), shape(s))
-               force(:, :geometry%n_node, e) = force(:, :geometry%n_node, e) + geometry%weight(k) &
-                  *matmul(matmul(f(:n, :n, k), s(:n, :n)), geometry%gradient(:, :, k))
-            end do
-         end associate
+         call solid_geometry(solid, e, geometry)
+         do k = 1, geometry%n_gp
+            call find_deformation(solid, e, geometry%gradient(:, :, k), u, square, f(:, :, k))
+            if (n < n_space .and. square > 0.0_wp) f(n_space, n_space, k) &
+               = sqrt(1.0_wp + 2.0_wp*strain(across, k))
+            call pull_back(f(:, :, k), stress(:, k))
+         end do
+         if (allocated(geometry%mode)) call return_modes(geometry, n, stress)
+         do k = 1, geometry%n_gp
+            s = reshape(stress([place_of], k), shape(s))
+            force(:, :geometry%n_node, e) = force(:, :geometry%n_node, e) + geometry%weight(k) &
+               *matmul(matmul(f(:n, :n, k), s(:n, :n)), geometry%gradient(:, :, k))
+         end do
       end do
    end subroutine stress_forces
 
@@ -326,9 +333,10 @@ contains
    end subroutine return_modes
 
    !> By what the material at a point of an element is turned and stretched; 1 across the plane.
-   pure subroutine find_deformation(solid, e, point, u, square, f)
+   pure subroutine find_deformation(solid, e, gradient, u, square, f)
       type(solid_t), intent(in) :: solid
-      integer, intent(in) :: e, point
+      integer, intent(in) :: e
+      real(wp), intent(in) :: gradient(:, :)     !! (n_dim, nodes of it) at the point [1/L]
       real(wp), intent(in), contiguous :: u(:, :)            !! (n_dim, n_node) [L]
       real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       real(wp), intent(out) :: f(n_space, n_space)
@@ -345,10 +353,10 @@ contains
          call place(solid, e, u, motion, turn)
          f(:n, :n) = turn
       else if (.not. solid%trait%is_small(e)) then
-         associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         associate (node => solid%node(:solid%trait%n_node(e), e))
             f(:n, :n) = f(:n, :n) + square*matmul(u(:, node) &
                - spread(u(:, node(1)), 2, size(node)), &
-               transpose(solid%geometry(e)%gradient(:, :, point)))
+               transpose(gradient))
          end associate
       end if
    end subroutine find_deformation
@@ -382,8 +390,8 @@ contains
 
       energy = 0.0_wp
       do e = 1, solid%n_element
-         do j = 1, solid%geometry(e)%n_node
-            do i = 1, solid%geometry(e)%n_node
+         do j = 1, solid%trait%n_node(e)
+            do i = 1, solid%trait%n_node(e)
                energy(e) = energy(e) + 0.5_wp*solid%mass%consistent(i, j, e) &
                   *dot_product(v(:, solid%node(i, e)), v(:, solid%node(j, e)))
             end do

@@ -9,6 +9,7 @@ module emcon_correction
    use emcon_independent_rows, only : independent_rows_find
    use emcon_kept_factor, only : kept_factor_free, kept_factor_set_up, kept_factor_t
    use emcon_kinds, only : dp, int64, wp
+   use emcon_memory, only : memory_factors, memory_go_on, memory_take
    use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
       null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
       obstacle_pivot
@@ -307,9 +308,11 @@ contains
 
       is_singular = .true.
       self%is_definite = .false.
+      call memory_go_on(self%kept%memory)
       if (is_symmetric) then
          call self%definite_solver%analyse(matrix, error)
          if (.not. allocated(error)) call solver_renew(self%definite_solver, matrix%value, error)
+         call memory_take(self%kept%memory, memory_factors)
          if (allocated(error)) return
          self%is_definite = .not. self%definite_solver%is_singular
       end if
@@ -319,6 +322,7 @@ contains
       self%solver%seeks_less_fill = system%space%numbering%n_dependent > 0
       call self%solver%analyse(matrix, error)
       if (.not. allocated(error)) call solver_renew(self%solver, matrix%value, error)
+      call memory_take(self%kept%memory, memory_factors)
       is_singular = self%solver%is_singular
    end subroutine factorise_free
 

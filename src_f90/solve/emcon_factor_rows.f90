@@ -4,6 +4,8 @@
 module emcon_factor_rows
    use emcon_kinds, only : dp
    use emcon_lapack, only : dense_cholesky_solve
+   use emcon_row_panels, only : panels_add, panels_fill_products, panels_subtract_products, &
+      row_panel_t
    implicit none
    private
    public :: factor_rows_t, factor_rows_begin, factor_rows_make_room, factor_rows_fill_products, &
@@ -15,6 +17,7 @@ module emcon_factor_rows
       integer, allocatable :: index(:)           !! (>= start(n + 1)) unknowns, from 0
       real(dp), allocatable :: w(:)              !! (>= start(n + 1))
       real(dp), allocatable :: l(:, :)           !! (n, n) W^T W, or its factor
+      type(row_panel_t), allocatable :: panel(:) !! W, in place of `index` and `w`
       real(dp), allocatable, private :: mu(:)    !! (n)
    end type factor_rows_t
 
@@ -29,6 +32,7 @@ contains
          if (self%n /= n) deallocate(self%l, self%start, self%mu)
       end if
       if (.not. allocated(self%l)) allocate(self%l(n, n), self%start(n + 1), self%mu(n))
+      if (allocated(self%panel)) deallocate(self%panel)
       self%n = n
       self%start(1) = 0
    end subroutine factor_rows_begin
@@ -51,12 +55,16 @@ contains
    end subroutine factor_rows_make_room
 
    !> W^T W, its lower triangle.
-   pure subroutine factor_rows_fill_products(self, y)
+   subroutine factor_rows_fill_products(self, y)
       type(factor_rows_t), intent(inout) :: self
       real(dp), intent(out), contiguous :: y(:)  !! (n_unknown) work space
       integer :: k, i, j
       real(dp) :: total
 
+      if (allocated(self%panel)) then
+         call panels_fill_products(self%panel, self%l)
+         return
+      end if
       y = 0.0_dp
       do k = 1, self%n
          do j = self%start(k) + 1, self%start(k + 1)
@@ -76,12 +84,16 @@ contains
    end subroutine factor_rows_fill_products
 
    !> mu = mu - W^T y
-   pure subroutine factor_rows_subtract_products(self, y, mu)
+   subroutine factor_rows_subtract_products(self, y, mu)
       type(factor_rows_t), intent(in) :: self
-      real(dp), intent(in) :: y(:)               !! (n_unknown)
+      real(dp), intent(in), contiguous :: y(:)   !! (n_unknown)
       real(dp), intent(inout) :: mu(:)           !! (n)
       integer :: k, j
 
+      if (allocated(self%panel)) then
+         call panels_subtract_products(self%panel, y, mu)
+         return
+      end if
       do k = 1, self%n
          do j = self%start(k) + 1, self%start(k + 1)
             mu(k) = mu(k) - self%w(j)*y(self%index(j) + 1)
@@ -90,12 +102,16 @@ contains
    end subroutine factor_rows_subtract_products
 
    !> y = y + W mu
-   pure subroutine factor_rows_add(self, mu, y)
+   subroutine factor_rows_add(self, mu, y)
       type(factor_rows_t), intent(in) :: self
       real(dp), intent(in) :: mu(:)              !! (n)
-      real(dp), intent(inout) :: y(:)            !! (n_unknown)
+      real(dp), intent(inout), contiguous :: y(:)    !! (n_unknown)
       integer :: k, j
 
+      if (allocated(self%panel)) then
+         call panels_add(self%panel, mu, y)
+         return
+      end if
       do k = 1, self%n
          do j = self%start(k) + 1, self%start(k + 1)
             y(self%index(j) + 1) = y(self%index(j) + 1) + mu(k)*self%w(j)
@@ -106,7 +122,7 @@ contains
    !> y = y - W (W^T W)^-1 W^T y: what of it is along no row.
    subroutine factor_rows_project(self, y)
       type(factor_rows_t), intent(inout) :: self !! with the factor of W^T W
-      real(dp), intent(inout) :: y(:)            !! (n_unknown)
+      real(dp), intent(inout), contiguous :: y(:)    !! (n_unknown)
 
       if (self%n == 0) return
       self%mu = 0.0_dp

@@ -12,13 +12,14 @@ module emcon_kept_factor
    use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_t
-   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, blocks_reach, &
-      blocks_solve, diagonal_blocks_t
+   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
+      blocks_has_panels, blocks_reach, blocks_reach_rows, blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
    use emcon_factor_rows, only : factor_rows_add, factor_rows_begin, factor_rows_fill_products, &
       factor_rows_make_room, factor_rows_subtract_products, factor_rows_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
+   use emcon_memory, only : memory_factors, memory_go_on, memory_t, memory_take
    use emcon_numbering, only : numbering_t
    use emcon_projected_gradients, only : projected_begin, projected_gradients_t, projected_solve
    use emcon_solver_registry, only : solver_create
@@ -46,6 +47,8 @@ module emcon_kept_factor
    !> And of gaps in their multipliers alone: they tell which contacts act, and with two digits they
    !> tell it wrongly too often.
    real(dp), parameter :: condensed_accuracy = 1.0e-4_dp
+   !> From so many constraints on they go through factors of dense blocks together.
+   integer, parameter :: least_panels = 200
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
@@ -54,6 +57,7 @@ module emcon_kept_factor
       integer :: most_products = 4
       integer :: n_renewal = 0                   !! factors made so far
       integer :: n_forward = 0                   !! columns of W made so far
+      type(memory_t) :: memory                       !! of it, and of those that are not kept
       integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
       type(factor_rows_t), private :: rows           !! the constraints last taken
@@ -126,7 +130,9 @@ contains
       integer :: k
 
       self%is_made = .false.
+      call memory_go_on(self%memory)
       call blocks_analyse(self%blocks, matrix, is_new, error)
+      call memory_take(self%memory, memory_factors)
       if (allocated(error)) return
       if (.not. self%blocks%is_symmetric) return
       if (is_new) call lay_out(self, matrix)
@@ -134,6 +140,7 @@ contains
          self%diagonal(k) = matrix%value(csr_find(matrix, k, k))
       end do
       call blocks_factorise(self%blocks, matrix, is_singular, error)
+      call memory_take(self%memory, memory_factors)
       if (allocated(error)) return
       self%is_made = .not. is_singular
       if (self%is_made .and. self%blocks%is_incomplete) then
@@ -312,6 +319,12 @@ contains
          if (size(self%mu) /= set%n_row) deallocate(self%mu, self%bend)
       end if
       if (.not. allocated(self%mu)) allocate(self%mu(set%n_row), self%bend(set%n_row))
+      self%n_forward = self%n_forward + set%n_row
+      if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
+         call blocks_reach_rows(self%blocks, set%gap_rows, set%n_row, self%rows%panel, error)
+         if (.not. allocated(error)) call factor_rows_fill_products(self%rows, self%y)
+         return
+      end if
       do k = 1, set%n_row
          call factor_rows_make_room(self%rows, self%rows%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
@@ -329,7 +342,6 @@ contains
          if (allocated(error)) return
          self%rows%start(k + 1) = self%rows%start(k) + n
       end do
-      self%n_forward = self%n_forward + set%n_row
       call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
 

@@ -17,6 +17,7 @@ module emcon_stepper
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_set_threads, march_t
+   use emcon_memory, only : memory_go_on, memory_scene, memory_t, memory_take
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_append, notes_t, string_t, to_text
    use emcon_threads, only : threads_check, threads_default
@@ -43,6 +44,7 @@ module emcon_stepper
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
       type(notes_t) :: notes                     !! what was done before the first step
       type(verdict_t) :: verdict                 !! on the increments so far
+      type(memory_t) :: memory                   !! of the deck and the scene
    end type stepper_t
 
 contains
@@ -68,6 +70,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(diagnostics_t) :: diagnostics
 
+      call memory_go_on(self%memory)
       call deck_open(path, self%source, diagnostics)
       call read_opened(self, override, is_lenient, diagnostics, error)
    end subroutine stepper_read
@@ -82,6 +85,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(diagnostics_t) :: diagnostics
 
+      call memory_go_on(self%memory)
       call deck_open_text(text, passage, file_name, self%source, diagnostics)
       call read_opened(self, override, is_lenient, diagnostics, error)
    end subroutine stepper_read_text
@@ -102,6 +106,7 @@ contains
       self%override = override
       self%is_lenient = is_lenient
       call stepper_read_source(self, diagnostics, error)
+      call memory_take(self%memory, memory_scene)
    end subroutine read_opened
 
    !> The scene of the deck source that `self` holds.

@@ -16,6 +16,8 @@ module emcon_system
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
    use emcon_lagged_forces, only : lagged_forces_give, lagged_forces_t
+   use emcon_memory, only : memory_contact, memory_elements, memory_go_on, memory_matrix, &
+      memory_t, memory_take
    use emcon_motion, only : motion_t
    use emcon_phases, only : phase_assemble, phase_enter, phase_leave, phase_residual, phases_t
    use emcon_reduction, only : reduction_add
@@ -54,6 +56,7 @@ module emcon_system
       type(lagged_forces_t) :: lagged            !! forces that stand for those of the terms
       type(notes_t) :: notes                     !! on the linear constraints of the step
       type(phases_t) :: phases                   !! where the time goes
+      type(memory_t) :: memory                   !! and the memory
    end type system_t
 
 contains
@@ -66,10 +69,13 @@ contains
       type(host_t), intent(in), optional :: host
       type(lists_t) :: lists
 
+      call memory_go_on(self%memory)
       call terms_create(scene, self%term, error, host)
       if (allocated(error)) return
+      call memory_take(self%memory, memory_elements)
       call lay_out(self, scene, lists)
       call space_init(self%space, scene, lists)
+      call memory_take(self%memory, memory_matrix)
       if (scene%host%is_whole) self%space%is_alive = .true.
       call constraints_create(scene, self%space%linear, self%permanent, host)
       if (present(host)) then
@@ -77,8 +83,10 @@ contains
       end if
       call init_contact(self, scene, error, host)
       if (allocated(error)) return
+      call memory_take(self%memory, memory_contact)
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &
          size(scene%element%kind))
+      call memory_take(self%memory, memory_elements)
    end subroutine system_init
 
    !> The contact of pairs and guards, and the numbers of conditions: those of `held`, then theirs.
@@ -155,6 +163,7 @@ contains
       integer, allocatable :: slot(:)
       integer :: first(size(self%term) + 1), k
 
+      call memory_go_on(self%memory)
       self%i_step = i_step
       self%notes = notes_t()
       self%stiffening = stiffening_t()
@@ -175,6 +184,8 @@ contains
          call self%term(k)%term%begin_step(scene, i_step, self%space, self%matrix, &
             slot(first(k) + 1:first(k + 1)))
       end do
+      deallocate(slot)
+      call memory_take(self%memory, memory_matrix)
       call find_acting(self)
       if (step_is_dynamic(scene%step(i_step))) call check_mass(self, scene, error)
    end subroutine system_begin_step

@@ -21,18 +21,29 @@ module emcon_inertia
    public :: inertia_t, inertia_init, inertia_add, inertia_times, inertia_values, &
       inertia_mass
 
+   !> Mass between nodes, with values in the precision of the state.
+   type :: node_mass_t
+      type(csr_t) :: pattern                     !! (n_node x n_node), without values
+      real(wp), allocatable :: value(:)          !! as `pattern` [M]
+   end type node_mass_t
+
+   !> Where a mass between nodes stands in the matrix. Between most nodes it does as it is, with the
+   !> directions of both one behind the other: one place and a stride tell all of these.
+   type :: spots_t
+      integer, allocatable :: first(:)           !! (entries) place of direction 1; 0: in `place`
+      integer, allocatable :: stride(:)          !! (n_node) to the next direction
+      integer, allocatable :: place(:)           !! of all other entries
+      real(dp), allocatable :: value(:)          !! as `place` [M]
+   end type spots_t
+
    type, extends(term_t) :: inertia_t
-      !> Entries of the matrix that have mass, a third of them in space, and how much
-      integer, allocatable, private :: place(:)
-      real(dp), allocatable, private :: value(:)
+      type(spots_t), private :: spots            !! where it is in the matrix
       integer, private :: n_entry = 0            !! of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
       logical, allocatable :: without_density(:) !! (n_node) it has none of its own
       type(csr_t), private :: host, added        !! (n_node x n_node) beside it [M]
-      type(csr_t), private :: consistent, lumped     !! (n_node x n_node) [M]
+      type(node_mass_t), private :: consistent, lumped
       logical, private :: is_lumped = .false.    !! in the present step that is the mass
-      !> Their values in the precision of the state
-      real(wp), allocatable, private :: consistent_value(:), lumped_value(:)
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
@@ -91,9 +102,9 @@ contains
       n = size(list)
       list = [list, reshape(self%pair, [size(self%pair)])]
       start = [start, [(n + 1 + 2*i, i = 1, size(self%pair, 2))]]
-      call csr_from_elements(self%consistent, solid%n_node, start, list, slot, error)
+      call csr_from_elements(self%consistent%pattern, solid%n_node, start, list, slot, error)
       if (allocated(error)) return
-      allocate(value(size(self%consistent%column)), source=0.0_hp)
+      allocate(value(size(self%consistent%pattern%column)), source=0.0_hp)
       k = 0
       do e = 1, solid%n_element
          n = start(e + 1) - start(e)
@@ -104,10 +115,10 @@ contains
             end do
          end do
       end do
-      call add_beside(self%consistent, self%host, value)
-      call add_beside(self%consistent, self%added, value)
-      self%consistent%value = real(value, dp)
-      self%consistent_value = real(value, wp)
+      call add_beside(self%consistent%pattern, self%host, value)
+      call add_beside(self%consistent%pattern, self%added, value)
+      deallocate(self%consistent%pattern%value)
+      self%consistent%value = real(value, wp)
       self%is_lumped = .false.
       call lump(self, solid)
    end subroutine add_up
@@ -120,14 +131,14 @@ contains
       real(hp) :: value(solid%n_node)
       integer :: e, i
 
-      associate (lumped => self%lumped)
+      associate (lumped => self%lumped%pattern)
          lumped%n_row = solid%n_node
          lumped%n_col = solid%n_node
          lumped%row_start = [(i, i = 0, solid%n_node)]
          lumped%column = [(i - 1, i = 1, solid%n_node)]
          value = 0.0_hp
          do e = 1, solid%n_element
-            associate (n => solid%geometry(e)%n_node)
+            associate (n => solid%trait%n_node(e))
                call lumped_mass(solid%mass%consistent(:n, :n, e), share(:n))
                do i = 1, n
                   associate (to => value(solid%node(i, e)))
@@ -138,8 +149,7 @@ contains
          end do
          call add_rows(value, self%host)
          call add_rows(value, self%added)
-         lumped%value = real(value, dp)
-         self%lumped_value = real(value, wp)
+         self%lumped%value = real(value, wp)
       end associate
    end subroutine lump
 
@@ -210,46 +220,103 @@ contains
       type(space_t), intent(in) :: space
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not used: mass is placed node by node
-      real(dp) :: side(size(space%reduction%side%value))
-      real(dp), allocatable :: value(:)          ! in the pattern of the matrix
       integer, allocatable :: number(:)
-      integer :: k, n_dim
 
       self%is_lumped = scene%step(i_step)%scheme%lumps_mass
+      self%n_entry = size(matrix%column)
       allocate(number, source=freedom_numbers(space%numbering))
-      n_dim = size(space%is_alive, 1)
+      if (self%is_lumped) then
+         call find_spots(self%lumped, space, matrix, number, self%spots)
+      else
+         call find_spots(self%consistent, space, matrix, number, self%spots)
+      end if
+   end subroutine begin_step
+
+   !> Where a mass stands in the matrix, and what becomes of it where unknowns are eliminated.
+   subroutine find_spots(mass, space, matrix, number, spots)
+      type(node_mass_t), intent(in) :: mass
+      type(space_t), intent(in) :: space
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: number(:)           !! (freedoms)
+      type(spots_t), intent(out) :: spots
+      real(dp) :: side(size(space%reduction%side%value))
+      real(dp), allocatable :: value(:)          ! in the pattern of the matrix
+      integer :: i, j, k, place(size(space%is_alive, 1))
+
       side = 0.0_dp
       allocate(value(size(matrix%column)), source=0.0_dp)
-      if (self%is_lumped) then
-         call add_entries(self%lumped)
-      else
-         call add_entries(self%consistent)
-      end if
+      allocate(spots%first(size(mass%value)), spots%stride(mass%pattern%n_row), source=0)
+      do i = 1, mass%pattern%n_row
+         do j = mass%pattern%row_start(i) + 1, mass%pattern%row_start(i + 1)
+            call find_places(i, j)
+            do k = 1, size(place)
+               if (place(k) > 0) value(place(k)) = value(place(k)) + real(mass%value(j), dp)
+               if (place(k) < 0) side(-place(k)) = side(-place(k)) + real(mass%value(j), dp)
+            end do
+         end do
+      end do
       call reduction_fold(space%reduction, matrix, value, side)
-      self%n_entry = size(value)
-      self%place = pack([(k, k = 1, size(value))], abs(value) > 0.0_dp)
-      self%value = value(self%place)
+      do i = 1, mass%pattern%n_row
+         do j = mass%pattern%row_start(i) + 1, mass%pattern%row_start(i + 1)
+            call find_places(i, j)
+            if (.not. stands_alone(real(mass%value(j), dp))) cycle
+            spots%first(j) = place(1)
+            value(place) = 0.0_dp          ! what is left has places of its own
+         end do
+      end do
+      spots%place = pack([(k, k = 1, size(value))], abs(value) > 0.0_dp)
+      spots%value = value(spots%place)
 
    contains
 
-      !> Add a mass to the values and to those at the side.
-      subroutine add_entries(mass)
-         type(csr_t), intent(in) :: mass         !! (n_node x n_node) [M]
-         integer :: i, j, a, place
+      !> Of entry `j` of the mass, in row `i`, in all directions.
+      subroutine find_places(i, j)
+         integer, intent(in) :: i, j
 
-         do i = 1, mass%n_row
-            do j = mass%row_start(i) + 1, mass%row_start(i + 1)
-               do a = 1, n_dim
-                  place = reduction_slot(space%reduction, matrix, number(n_dim*(i - 1) + a), &
-                     number(n_dim*mass%column(j) + a))
-                  if (place > 0) value(place) = value(place) + mass%value(j)
-                  if (place < 0) side(-place) = side(-place) + mass%value(j)
-               end do
+         associate (n => size(place))
+            place = [(reduction_slot(space%reduction, matrix, number(n*(i - 1) + k), &
+               number(n*mass%pattern%column(j) + k)), k = 1, n)]
+         end associate
+      end subroutine find_places
+
+      !> Is a mass all that is at its places, which have the stride of the row?
+      logical function stands_alone(own)
+         real(dp), intent(in) :: own
+         integer :: a
+
+         stands_alone = .false.
+         if (any(place <= 0) .or. .not. abs(own) > 0.0_dp) return
+         if (spots%stride(i) == 0) spots%stride(i) = place(size(place)) &
+            - place(size(place) - 1)
+         stands_alone = all([(place(a) - place(a - 1) == spots%stride(i), a = 2, size(place))]) &
+            .and. .not. any(abs(value(place) - own) > 0.0_dp)
+      end function stands_alone
+
+   end subroutine find_spots
+
+   !> Add a factor times the mass to the values of the matrix.
+   pure subroutine add_mass(n_dim, mass, spots, factor, value)
+      integer, intent(in) :: n_dim
+      type(node_mass_t), intent(in) :: mass
+      type(spots_t), intent(in) :: spots
+      real(dp), intent(in) :: factor
+      real(dp), intent(inout), contiguous :: value(:)
+      integer :: a, i, k, place
+
+      do i = 1, mass%pattern%n_row
+         do k = mass%pattern%row_start(i) + 1, mass%pattern%row_start(i + 1)
+            place = spots%first(k)
+            if (place == 0) cycle
+            do a = 1, n_dim
+               value(place) = value(place) + factor*real(mass%value(k), dp)
+               place = place + spots%stride(i)
             end do
          end do
-      end subroutine add_entries
-
-   end subroutine begin_step
+      end do
+      do k = 1, size(spots%place)
+         value(spots%place(k)) = value(spots%place(k)) + factor*spots%value(k)
+      end do
+   end subroutine add_mass
 
    !> The mass between nodes, as it is in the present step.
    pure subroutine inertia_mass(self, mass)
@@ -257,9 +324,11 @@ contains
       type(csr_t), intent(out) :: mass           !! (n_node x n_node) [M]
 
       if (self%is_lumped) then
-         mass = self%lumped
+         mass = self%lumped%pattern
+         mass%value = real(self%lumped%value, dp)
       else
-         mass = self%consistent
+         mass = self%consistent%pattern
+         mass%value = real(self%consistent%value, dp)
       end if
    end subroutine inertia_mass
 
@@ -269,7 +338,11 @@ contains
       real(dp), allocatable, intent(out) :: value(:)     !! (entries of the matrix) [M]
 
       allocate(value(self%n_entry), source=0.0_dp)
-      value(self%place) = self%value
+      if (self%is_lumped) then
+         call add_mass(size(self%rate, 1), self%lumped, self%spots, 1.0_dp, value)
+      else
+         call add_mass(size(self%rate, 1), self%consistent, self%spots, 1.0_dp, value)
+      end if
    end subroutine inertia_values
 
    !> s M (b du - w v0), and the sizes of what it consists of; nothing where s = 0.
@@ -279,15 +352,15 @@ contains
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       real(dp) :: factor
-      integer :: k, n
+      integer :: n
 
       associate (evaluation => motion%evaluation, total => response%part(self%role))
          if (.not. evaluation%mass_scale > 0.0_wp) return
          factor = real(evaluation%mass_scale*evaluation%rate, dp)
-         if (present(value)) then
-            do k = 1, size(self%place)
-               value(self%place(k)) = value(self%place(k)) + factor*self%value(k)
-            end do
+         if (present(value) .and. self%is_lumped) then
+            call add_mass(size(self%rate, 1), self%lumped, self%spots, factor, value)
+         else if (present(value)) then
+            call add_mass(size(self%rate, 1), self%consistent, self%spots, factor, value)
          end if
          n = size(self%rate)
          call vector_sum(n, motion%du, 1.0_wp, motion%offset, self%rate)
@@ -324,13 +397,22 @@ contains
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
 
       if (self%is_lumped) then
-         call rows_times(size(field, 1), self%lumped%n_row, self%lumped%row_start, &
-            self%lumped%column, self%lumped_value, field, product)
+         call mass_times(self%lumped, field, product)
       else
-         call rows_times(size(field, 1), self%consistent%n_row, self%consistent%row_start, &
-            self%consistent%column, self%consistent_value, field, product)
+         call mass_times(self%consistent, field, product)
       end if
    end subroutine inertia_times
+
+   pure subroutine mass_times(mass, field, product)
+      type(node_mass_t), intent(in) :: mass
+      real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
+      real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
+
+      associate (rows => mass%pattern)
+         call rows_times(size(field, 1), rows%n_row, rows%row_start, rows%column, mass%value, &
+            field, product)
+      end associate
+   end subroutine mass_times
 
    !> Rows of a sparse matrix times vectors, two directions at a time: the rows are read once.
    pure subroutine rows_times(n_dim, n_row, row_start, column, value, field, product)

@@ -30,9 +30,11 @@ module emcon_loads
       type(load_t), allocatable :: load(:)
       type(amplitude_t), allocatable, private :: amplitude(:)   !! of the scene
       integer, allocatable, private :: frame(:, :)  !! (n_dim + 1, bodies) of rigid bodies
-      integer, allocatable, private :: face(:, :)   !! (n, n_load) nodes of a loaded face, else 0
-      integer, allocatable, private :: n_on(:)      !! (n_load) how many these are
-      !> (n_dim*n, n_dim*n, n_load) places of the stiffness of pressure on it
+      !> (n_load) of pressures and moments: their number among these, else 0
+      integer, allocatable, private :: at(:)
+      integer, allocatable, private :: face(:, :)   !! (n, these) nodes that they act on together
+      integer, allocatable, private :: n_on(:)      !! (these) how many
+      !> (n_dim*n, n_dim*n, these) places of the stiffness between them
       integer, allocatable, private :: slot(:, :, :)
       logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
       logical, private :: is_axial = .false.     !! on solids of revolution
@@ -70,7 +72,7 @@ contains
       self%node = solid%node
       self%volume_mass = solid%mass%of_volume
       self%thickness = solid%thickness
-      self%is_axial = solid%is_axial
+      self%is_axial = solid%is_of_rings
       self%is_linear = solid%trait%is_linear
       allocate(self%load(0))
       allocate(self%frame(size(scene%x, 1) + 1, size(scene%rigid)))
@@ -96,7 +98,7 @@ contains
       allocate(self%own_mass, mold=solid%mass%of_volume)
       allocate(self%first_moment(size(x, 1), size(solid%node, 1), solid%n_element))
       do e = 1, solid%n_element
-         associate (n => solid%geometry(e)%n_node)
+         associate (n => solid%trait%n_node(e))
             associate (mass => solid%mass%consistent(:n, :n, e), node => solid%node(:n, e))
                self%own_mass(:n, e) = sum(mass, 2)
                self%first_moment(:, :n, e) = matmul(x(:, node), mass)
@@ -141,9 +143,9 @@ contains
       type(space_t), intent(in) :: space
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not needed: they are found again
-      integer, allocatable :: number(:)
-      integer :: dof(scene%n_dim, maxval([moment_nodes, scene%element%kinds%n_face_node])), i, e, &
-         j, k, a
+      integer, allocatable :: number(:), all(:)
+      integer :: dof(scene%n_dim, maxval([moment_nodes, scene%element%kinds%n_face_node])), i, j, &
+         k, a
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
@@ -154,37 +156,54 @@ contains
          end do
          self%duration = step%time%duration
       end associate
-      if (allocated(self%face)) deallocate(self%face, self%n_on, self%slot)
-      allocate(self%face(size(dof, 2), size(self%load)), self%n_on(size(self%load)), source=0)
-      allocate(self%slot(size(dof), size(dof), size(self%load)), source=0)
+      call find_nodes(self, scene)
       allocate(number, source=freedom_numbers(space%numbering))
-      do i = 1, size(self%load)
-         select case (self%load(i)%kind)
-         case (load_pressure)
-            e = self%load(i)%target
-            associate (kind => scene%element%kinds(scene%element%kind(e)))
-               self%n_on(i) = kind%n_face_node
-               self%face(:self%n_on(i), i) = scene%element%node(kind%face(self%load(i)%place), e)
-            end associate
-         case (load_moment)
-            self%n_on(i) = moment_nodes
-            self%face(:moment_nodes, i) = self%frame(:moment_nodes, &
-               findloc(self%frame(1, :), self%load(i)%target, 1))
-         case default
-            cycle
-         end select
-         do a = 1, scene%n_dim
-            dof(a, :self%n_on(i)) = number(scene%n_dim*(self%face(:self%n_on(i), i) - 1) + a)
-         end do
-         associate (all => reshape(dof(:, :self%n_on(i)), [scene%n_dim*self%n_on(i)]))
-            do k = 1, size(all)
-               do j = 1, size(all)
-                  self%slot(j, k, i) = reduction_slot(space%reduction, matrix, all(j), all(k))
-               end do
+      do i = 1, size(self%n_on)
+         associate (n => self%n_on(i))
+            do a = 1, scene%n_dim
+               dof(a, :n) = number(scene%n_dim*(self%face(:n, i) - 1) + a)
             end do
+            all = reshape(dof(:, :n), [scene%n_dim*n])
          end associate
+         do k = 1, size(all)
+            do j = 1, size(all)
+               self%slot(j, k, i) = reduction_slot(space%reduction, matrix, all(j), all(k))
+            end do
+         end do
       end do
    end subroutine begin_step
+
+   !> The nodes that pressures and moments act on together.
+   pure subroutine find_nodes(self, scene)
+      class(loads_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      logical :: is_on_some(size(self%load))
+      integer :: e, i, k, n
+
+      is_on_some = self%load%kind == load_pressure .or. self%load%kind == load_moment
+      n = count(is_on_some)
+      if (allocated(self%face)) deallocate(self%face, self%n_on, self%slot)
+      associate (most => maxval([moment_nodes, scene%element%kinds%n_face_node]))
+         allocate(self%face(most, n), self%n_on(n), source=0)
+         allocate(self%slot(scene%n_dim*most, scene%n_dim*most, n), source=0)
+      end associate
+      self%at = unpack([(k, k = 1, n)], is_on_some, spread(0, 1, size(self%load)))
+      do i = 1, size(self%load)
+         if (.not. is_on_some(i)) cycle
+         e = self%load(i)%target
+         associate (n_on => self%n_on(self%at(i)), face => self%face(:, self%at(i)))
+            if (self%load(i)%kind == load_moment) then
+               n_on = moment_nodes
+               face(:n_on) = self%frame(:n_on, findloc(self%frame(1, :), e, 1))
+            else
+               associate (kind => scene%element%kinds(scene%element%kind(e)))
+                  n_on = kind%n_face_node
+                  face(:n_on) = scene%element%node(kind%face(self%load(i)%place), e)
+               end associate
+            end if
+         end associate
+      end do
+   end subroutine find_nodes
 
    !> Take the loads of step `i_step` as they are.
    subroutine renew(self, scene, i_step)
@@ -245,10 +264,11 @@ contains
                p = p*self%thickness(load%target)
                call respond_pressure(self, i, p, motion, value, side)
             case (load_moment)
-               associate (frame => self%face(:moment_nodes, i))
+               associate (frame => self%face(:moment_nodes, self%at(i)))
                   call add_moment(frame, p, motion%x, motion%at, self%force)
                   if (present(value)) call add_moment_stiffness(motion%x(:, frame) &
-                     + motion%at(:, frame), p*motion%load_weight, self%slot(:, :, i), value, side)
+                     + motion%at(:, frame), p*motion%load_weight, self%slot(:, :, self%at(i)), &
+                     value, side)
                end associate
             end select
          end associate
@@ -288,11 +308,11 @@ contains
       real(wp), intent(in) :: p                  !! [M/T^2], in space and on rings [M/(L T^2)]
       type(motion_t), intent(in) :: motion       !! placed
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      real(wp) :: place(size(self%force, 1), self%n_on(i))
+      real(wp) :: place(size(self%force, 1), self%n_on(self%at(i)))
       integer :: j, m
 
-      m = size(self%force, 1)*self%n_on(i)
-      associate (face => self%face(:self%n_on(i), i))
+      m = size(self%force, 1)*self%n_on(self%at(i))
+      associate (face => self%face(:self%n_on(self%at(i)), self%at(i)))
          if (size(self%force, 1) == n_space) then
             do j = 1, size(face)
                place(:, j) = motion%x(:, face(j)) - motion%x(:, face(1))
@@ -302,16 +322,17 @@ contains
             associate (table => self%on_face(size(face)))
                call press_face(face, table, p, place, self%force)
                if (present(value) .and. self%follows(i)) call press_face_stiffness(table, &
-                  p*motion%load_weight, place, self%slot(:m, :m, i), value, side)
+                  p*motion%load_weight, place, self%slot(:m, :m, self%at(i)), value, side)
             end associate
          else if (self%is_axial) then
             call press_ring(face, p, motion%x, motion%at, self%follows(i), self%force)
             if (present(value) .and. self%follows(i)) call press_ring_stiffness(face, &
-               p*motion%load_weight, motion%x, motion%at, self%slot(:m, :m, i), value, side)
+               p*motion%load_weight, motion%x, motion%at, self%slot(:m, :m, self%at(i)), value, &
+               side)
          else
             call add_pressure(face, p, motion%x, motion%at, self%follows(i), self%force)
             if (present(value) .and. self%follows(i)) call add_pressure_stiffness( &
-               p*motion%load_weight, self%slot(:m, :m, i), value, side)
+               p*motion%load_weight, self%slot(:m, :m, self%at(i)), value, side)
          end if
       end associate
    end subroutine respond_pressure

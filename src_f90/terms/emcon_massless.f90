@@ -42,11 +42,11 @@ contains
       without_density = .false.
       if (all(solid%trait%has_inertia)) return
       do e = 1, solid%n_element
-         if (.not. solid%trait%has_inertia(e)) without_density(solid%node(:solid%geometry( &
-            e)%n_node, e)) = .true.
+         if (.not. solid%trait%has_inertia(e)) without_density(solid%node(:solid%trait%n_node( &
+            e), e)) = .true.
       end do
       do e = 1, solid%n_element
-         if (solid%trait%has_inertia(e)) without_density(solid%node(:solid%geometry(e)%n_node, e)) &
+         if (solid%trait%has_inertia(e)) without_density(solid%node(:solid%trait%n_node(e), e)) &
             = .false.
       end do
       call leave_joined(scene, is_given, without_density)
@@ -123,7 +123,7 @@ contains
 
       keeps = .false.
       do e = 1, solid%n_element
-         associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         associate (node => solid%node(:solid%trait%n_node(e), e))
             if (solid%trait%has_inertia(e) .and. all(is_massless(node))) keeps(node) = .true.
          end associate
       end do
@@ -142,7 +142,7 @@ contains
 
       hanging = solid%node
       do e = 1, solid%n_element
-         associate (n => solid%geometry(e)%n_node)
+         associate (n => solid%trait%n_node(e))
             hanging(n + 1:, e) = 0
             where (.not. is_massless(solid%node(:n, e))) hanging(:n, e) = 0
          end associate
@@ -152,7 +152,7 @@ contains
       do e = 1, solid%n_element
          k = maxval(hanging(:, e))
          if (k == 0) cycle
-         associate (own => holder(:, part(k)), node => solid%node(:solid%geometry(e)%n_node, e))
+         associate (own => holder(:, part(k)), node => solid%node(:solid%trait%n_node(e), e))
             do i = 1, size(node)
                if (hanging(i, e) > 0 .or. any(own == node(i))) cycle
                if (any(own == 0)) own(findloc(own, 0, 1)) = node(i)
@@ -172,7 +172,7 @@ contains
 
       do e = 1, solid%n_element
          if (.not. solid%trait%has_inertia(e)) cycle
-         associate (n => solid%geometry(e)%n_node)
+         associate (n => solid%trait%n_node(e))
             call shed(is_massless(solid%node(:n, e)), solid%mass%consistent(:n, :n, e))
             do i = 1, n
                solid%mass%of_volume(i, e) = sum(solid%mass%consistent(:n, i, e))
@@ -212,7 +212,7 @@ contains
       moved = 0.0_wp
       total = 0.0_wp
       do e = 1, solid%n_element
-         associate (node => solid%node(:solid%geometry(e)%n_node, e), n => solid%geometry(e)%n_node)
+         associate (node => solid%node(:solid%trait%n_node(e), e), n => solid%trait%n_node(e))
             associate (mass => sum(solid%mass%consistent(:n, :n, e)), k => body(node(1)))
                total(k) = total(k) + mass
                moved(k) = moved(k) + mass*count(is_massless(node))/n
@@ -296,7 +296,7 @@ contains
 
       weight = 0.0_wp
       do e = 1, solid%n_element
-         associate (own => solid%node(:solid%geometry(e)%n_node, e))
+         associate (own => solid%node(:solid%trait%n_node(e), e))
             if (.not. any(own == node)) cycle
             share = sum(solid%mass%consistent(:size(own), :size(own), e))/size(own)
             stencil%mass = stencil%mass + share

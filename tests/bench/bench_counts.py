@@ -30,11 +30,11 @@ PAGE = ROOT/"docs/performance.md"
 MOST = 1.03
 SCENES = {
     "two_bodies": {"h": 0.05, "t_end": 2},
-    "ring": {"h": 0.04, "t_end": 4},
-    "ring, MORTAR": {"h": 0.04, "t_end": 4, "formulation": "MORTAR"},
+    "ring": {"h": 0.04, "t_end": 4, "initiation": "PERSISTENT"},
+    "ring, MORTAR": {"h": 0.04, "t_end": 4, "formulation": "MORTAR", "initiation": "PERSISTENT"},
     "ring, massless": {"h": 0.04, "t_end": 4, "initiation": "MASSLESS"},
     "spinning_ring": {"h": 0.05, "t_end": 2},
-    "tied_ring": {"h": 0.05, "t_end": 2},
+    "tied_ring": {"h": 0.05, "t_end": 2, "initiation": "PERSISTENT"},
     "self_contact": {},
     "press_fit": {},
     "hertz": {},

@@ -142,6 +142,7 @@ program main
    use test_motion_bound, only : collect_motion_bound
    use test_pair_forces, only : collect_pair_forces
    use test_penalty_state, only : collect_penalty_state
+   use test_memory, only : collect_memory
    use test_name_index, only : collect_name_index
    use test_near_laws, only : collect_near_laws
    use test_newton, only : collect_newton
@@ -393,6 +394,7 @@ program main
    call run("linked_elements", collect_linked_elements)
    call run("thin_stress", collect_thin_stress)
    call run("line_search", collect_line_search)
+   call run("memory", collect_memory)
    call run("name_index", collect_name_index)
    call run("near_laws", collect_near_laws)
    call run("newton", collect_newton)

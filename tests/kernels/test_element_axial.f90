@@ -139,7 +139,7 @@ contains
       part%force(:2, :sample%n) = 2.0_wp
       part%magnitude(:2, :sample%n) = 3.0_wp
       part%tangent(:2, :sample%n, :2, :sample%n) = merge(4.0_wp, 0.0_wp, with_tangent)
-      call axial_element_respond(sample%solid%geometry(1), &
+      call axial_element_respond(sample%solid%held%single(1), &
          sample%solid%law(sample%solid%law_of(1))%law, motion, with_tangent, part)
    end subroutine respond
 
@@ -229,7 +229,7 @@ contains
          call make_sample(1, law, .true., 0.0_wp, sample, error)
          if (allocated(error)) return
          associate (x => sample%x, n => sample%n)
-            r = 1.0_wp/maxval(sum(sample%solid%geometry(1)%circle(:n, :), 1))
+            r = 1.0_wp/maxval(sum(sample%solid%held%single(1)%circle(:n, :), 1))
             do way = 1, 3
                left = merge(sqrt(2.0_wp), 1.0_wp, way < 3)*some
                do k = 1, size(left)
@@ -281,7 +281,7 @@ contains
          if (allocated(error)) return
          call shake(grad, 0.2_wp)
          motion%square = merge(1.0_wp, 0.0_wp, sample%nlgeom)
-         associate (x => sample%x, n => sample%n, geometry => sample%solid%geometry(1), &
+         associate (x => sample%x, n => sample%n, geometry => sample%solid%held%single(1), &
                law => sample%solid%law(sample%solid%law_of(1))%law)
             motion%from(:2, :n) = matmul(grad, x(:, :n))
             call axial_element_hold(geometry, law, motion, stress, strain)
@@ -376,7 +376,7 @@ contains
             c*(1.0_wp + two*b), 0.0_wp, 0.0_wp]
          call law_response_space(sample%solid%law(1)%law, e, 0.0_wp*e, state)
          volume = ring(sample%x(:, :sample%n_corner), .false.)
-         call check_near(error, sum(sample%solid%geometry(1)%weight), volume, tol, volume, &
+         call check_near(error, sum(sample%solid%held%single(1)%weight), volume, tol, volume, &
             sample%what // ": volume")
          call respond(sample, u0, zero, .false., step)
          call check_near(error, step%energy, volume*state%energy, tol, young, &

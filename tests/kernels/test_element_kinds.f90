@@ -1,6 +1,7 @@
 !> Every kind of element of the plane, distorted, with each law: what a step and a mesh ask of it.
 module test_element_kinds
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_element, only : element_geometry_t
    use emcon_element_plane, only : element_motion_t, element_response_t
    use emcon_element_kind, only : element_row_t
    use emcon_element_registry, only : element_row
@@ -10,7 +11,7 @@ module test_element_kinds
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_scene, only : scene_t
    use emcon_shape, only : max_plane_nodes
-   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid, only : solid_geometry, solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_text, only : to_text
    use kind_rows, only : law_code, n_plane_row
@@ -260,6 +261,7 @@ contains
       type(sample_t) :: sample
       type(element_response_t) :: step
       type(law_response_t) :: state
+      type(element_geometry_t) :: geometry
       real(wp), parameter :: grad(2, 2) = reshape([0.1_wp, -0.2_wp, 0.3_wp, 0.15_wp], [2, 2])
       real(wp) :: u0(2, m), zero(2, m), e(3), f(2, 2), s(2, 2), p(2, 2), area
       integer :: a, b, i
@@ -284,7 +286,8 @@ contains
             [0.0_wp, 0.0_wp, 0.0_wp], state)
          s = reshape([state%stress(1), state%stress(3), state%stress(3), state%stress(2)], [2, 2])
          p = matmul(f, s)
-         area = sum(sample%solid%geometry(1)%weight)
+         call solid_geometry(sample%solid, 1, geometry)
+         area = sum(geometry%weight)
          call respond(sample, u0, zero, .false., step)
          call check_near(error, step%energy, area*state%energy, tol, young, &
             sample%what // ": energy")

@@ -1,10 +1,10 @@
 !> Elements in three dimensions, distorted, with each law: what a step and a mesh ask of them.
 module test_element_space
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_element_pack, only : element_pack_t, pack_fill, pack_make_room, pack_motion_t, &
-      pack_response_t
-   use emcon_element_space, only : space_element_init, space_element_mass, space_element_respond, &
-      space_element_t, space_motion_t, space_part_t
+   use emcon_element_pack, only : element_pack_t, pack_begin, pack_geometry, pack_make_room, &
+      pack_motion_t, pack_put, pack_response_t
+   use emcon_element_space, only : space_element_init, space_element_mass, space_element_place, &
+      space_element_respond, space_element_t, space_motion_t, space_part_t
    use emcon_errors, only : error_t
    use emcon_host_law, only : host_response_t
    use emcon_incompatible_modes, only : modes_init
@@ -14,6 +14,7 @@ module test_element_space
    use emcon_law_registry, only : law_create, law_linear
    use emcon_law_space, only : law_response_space, space_response_t
    use emcon_mean_volume_space, only : mean_volume_space_respond
+   use emcon_pack_points_space, only : pack_gradient
    use emcon_shape, only : m => max_element_nodes, shape_fault, shape_t, shape_table_t, &
       shape_tabulate
    use emcon_shape_hexahedron_space, only : shape_hexahedron_t
@@ -58,6 +59,7 @@ contains
          test_case_t("laws: a strain of the plane", test_plane), &
          test_case_t("identity, force and moments of a step", test_step), &
          test_case_t("tangent against differences", test_tangent), &
+         test_case_t("side by side: gradients", test_gradients), &
          test_case_t("side by side: as one by one", test_packs), &
          test_case_t("side by side: bits of a lane", test_lanes), &
          test_case_t("side by side: inverted ones", test_inverted), &
@@ -333,19 +335,71 @@ contains
 
       solid%n_dim = 3
       solid%n_element = n_lane
-      allocate(solid%law(1), solid%rest(1), solid%geometry(n_lane))
+      allocate(solid%law(1), solid%rest(1), solid%shape(1))
       allocate(solid%trait%has_mean(n_lane), source=name(kind) == "C3D8H")
       allocate(solid%host%first_point(n_lane), source=0)
       do e = 1, n_lane
          call make_sample(kind, law, nlgeom, 0.03_wp, sample(e), error)
          if (allocated(error)) return
-         solid%geometry(e) = sample(e)%element
       end do
+      call shape_tabulate(sample(1)%shape, .false., solid%shape(1)%table)
       allocate(solid%law(1)%law, source=sample(1)%law)
       if (allocated(sample(1)%rest)) allocate(solid%rest(1)%law, source=sample(1)%rest)
       allocate(solid%node(m, n_lane), source=0)
       solid%node(:sample(1)%n, :) = reshape([(i, i = 1, n_lane*sample(1)%n)], [sample(1)%n, n_lane])
    end subroutine make_solid
+
+   !> The elements `which` side by side.
+   subroutine fill_pack(sample, solid, which, pack)
+      type(sample_t), intent(in) :: sample(:)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: which(:)
+      type(element_pack_t), intent(out) :: pack
+      integer :: l
+
+      call pack_begin(pack, size(which), 1, 1)
+      do l = 1, size(which)
+         associate (own => sample(which(l)))
+            call pack_put(pack, l, which(l), solid%node(:own%n, which(l)), &
+               own%element, own%x(:, :own%n) - spread(own%x(:, 1), 2, own%n))
+         end associate
+      end do
+   end subroutine fill_pack
+
+   !> Gradients of elements side by side, found from their places: those of each alone, bit by bit.
+   subroutine test_gradients(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample(n_lane)
+      type(solid_t) :: solid
+      type(element_pack_t) :: pack
+      type(space_element_t) :: held
+      real(wp), allocatable :: gradient(:, :, :), x(:, :)
+      integer :: i, k, l
+
+      do i = 1, n_kind
+         call make_solid(i, 1, .true., sample, solid, error)
+         if (allocated(error)) return
+         call fill_pack(sample, solid, [3, 7, 1, 5], pack)
+         allocate(gradient(n_lane, 3, pack%n_node))
+         do l = 1, n_lane
+            associate (own => sample(pack%element(l))%element, what => sample(1)%what)
+               do k = 1, pack%n_gp
+                  call pack_gradient(pack%n_node, pack%x, solid%shape(1)%table%slope(:, :, k), &
+                     gradient)
+                  call check_true(error, .not. any(abs(gradient(l, :, :) - own%gradient(:, :, k)) &
+                     > 0.0_wp), what)
+               end do
+               call pack_geometry(pack, l, held, x)
+               call space_element_place(held, solid%shape(1)%table, x)
+               call check_true(error, .not. (any(abs(held%gradient - own%gradient) > 0.0_wp) &
+                  .or. any(abs(held%weight - own%weight) > 0.0_wp)), what // ": held")
+               if (allocated(own%mode)) call check_true(error, .not. any(abs(held%mode - own%mode) &
+                  > 0.0_wp), what // ": modes")
+            end associate
+         end do
+         deallocate(gradient)
+      end do
+   end subroutine test_gradients
 
    !> The response of the elements `which`, element e to the motion e.
    subroutine respond_pack(sample, solid, which, u0, du, with_tangent, part)
@@ -360,7 +414,7 @@ contains
       type(host_response_t) :: none
       integer :: i, l
 
-      call pack_fill(pack, which, 1, solid%node, solid%geometry)
+      call fill_pack(sample, solid, which, pack)
       call pack_make_room(3, m, with_tangent, motion, part)
       motion%square = merge(1.0_wp, 0.0_wp, sample(1)%nlgeom)
       do l = 1, n_lane

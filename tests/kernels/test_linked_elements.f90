@@ -207,7 +207,7 @@ contains
                      - motion%by(:, i))
                else
                   apart(:, j) = motion%from(:, j) + motion%by(:, j)
-                  if (.not. solid%is_axial) apart(:, j) = apart(:, j) - motion%from(:, 1) &
+                  if (.not. solid%is_of_rings) apart(:, j) = apart(:, j) - motion%from(:, 1) &
                      - motion%by(:, 1)
                end if
                largest = max(largest, maxval(abs(apart(:, j))))

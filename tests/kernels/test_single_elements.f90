@@ -4,6 +4,7 @@ module test_single_elements
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_critical_step, only : critical_bound
    use emcon_csr, only : csr_multiply
+   use emcon_element, only : element_geometry_t
    use emcon_element_kind, only : find_element_kind
    use emcon_element_registry, only : element_kinds_create
    use emcon_errors, only : error_t
@@ -16,7 +17,7 @@ module test_single_elements
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_small_widen_space, only : small_widen
-   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid, only : solid_geometry, solid_init, solid_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t, &
       system_tangent_times
@@ -354,6 +355,7 @@ contains
          0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [3, 3])
       type(scene_t) :: scene
       type(solid_t) :: solid
+      type(element_geometry_t) :: geometry
       real(wp) :: rotation, strain
       integer :: k
 
@@ -362,8 +364,9 @@ contains
       if (allocated(error)) return
       rotation = 0.0_wp
       strain = 0.0_wp
+      call solid_geometry(solid, 1, geometry)
       do k = 1, 2
-         call small_widen(solid%geometry(1), matmul(grad, scene%x)/real(k, wp), rotation, strain)
+         call small_widen(geometry, matmul(grad, scene%x)/real(k, wp), rotation, strain)
          call check_near(error, [rotation, strain], [0.02_wp**2, 0.03_wp**2], tol, 0.001_wp, &
             "squares")
       end do

@@ -2,6 +2,7 @@
 module test_solid
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
+   use emcon_element, only : element_geometry_t
    use emcon_element_plane, only : element_motion_t, element_response_t
    use emcon_element_registry, only : find_element_row
    use emcon_host_law, only : host_response_t
@@ -12,7 +13,7 @@ module test_solid
    use emcon_motion, only : motion_of, motion_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid, only : solid_geometry, solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_space, only : space_t
@@ -132,7 +133,7 @@ contains
       force = 0.0_wp
       associate (solid => term%solid)
          do e = 1, solid%n_element
-            n = solid%geometry(e)%n_node
+            n = solid%trait%n_node(e)
             associate (node => solid%node(:n, e))
                motion%from(:, :4) = local(u0(:, node))
                motion%by(:, :4) = local(du(:, node))
@@ -348,6 +349,7 @@ contains
       type(block_t) :: block
       type(solid_t) :: solid, quadratic
       type(stepper_t) :: stepper
+      type(element_geometry_t) :: geometry
       real(wp) :: expected(3), around(3), own(6), sums(6)
       integer :: k, j
 
@@ -360,13 +362,12 @@ contains
          if (allocated(error)) return
          expected = 0.0_wp
          around = 0.0_wp
-         associate (geometry => solid%geometry(1))
-            do j = 1, geometry%n_gp
-               if (k == 2) around = abs(geometry%circle(:, j))
-               expected = expected + geometry%weight(j)*(4.0_wp + sum(around)) &
-                  *([1.0_wp, 2.0_wp, 1.0_wp] + around)
-            end do
-         end associate
+         call solid_geometry(solid, 1, geometry)
+         do j = 1, geometry%n_gp
+            if (k == 2) around = abs(geometry%circle(:, j))
+            expected = expected + geometry%weight(j)*(4.0_wp + sum(around)) &
+               *([1.0_wp, 2.0_wp, 1.0_wp] + around)
+         end do
          ! By the law's half of its modulus, as over a step.
          call check_near(error, solid%stiffness(:3, 1), 0.5_wp*modulus*expected, tol, &
             modulus*expected(2), "stiffness by slopes")
@@ -374,16 +375,15 @@ contains
       call read_one("CAX6", 3, "NONLINEAR", stepper, error)
       if (.not. allocated(error)) call solid_init(quadratic, stepper%scene, error)
       if (allocated(error)) return
-      associate (geometry => quadratic%geometry(1))
-         sums = 0.0_wp
-         do j = 1, geometry%n_gp
-            own = sum(abs(geometry%gradient(:, :, j)), 1) + abs(geometry%circle(:, j))
-            sums = sums + geometry%weight(j)*sum(own)*own
-         end do
-         call check_true(error, any(geometry%circle < 0.0_wp), "below 0")
-         call check_near(error, quadratic%stiffness(:6, 1), 0.5_wp*modulus*sums, tol, &
-            modulus*maxval(sums), "with nodes between")
-      end associate
+      call solid_geometry(quadratic, 1, geometry)
+      sums = 0.0_wp
+      do j = 1, geometry%n_gp
+         own = sum(abs(geometry%gradient(:, :, j)), 1) + abs(geometry%circle(:, j))
+         sums = sums + geometry%weight(j)*sum(own)*own
+      end do
+      call check_true(error, any(geometry%circle < 0.0_wp), "below 0")
+      call check_near(error, quadratic%stiffness(:6, 1), 0.5_wp*modulus*sums, tol, &
+         modulus*maxval(sums), "with nodes between")
    end subroutine test_rounding
 
    !> Of a small curvature k, -k x y and k x**2/2 at nodes, a beam of CPE4I stores what one in plane

@@ -356,9 +356,9 @@ contains
          call check_near(error, ratio, 0.0_wp, 0.0_wp, 1.0_wp, "a ratio of none")
       end do
       solid%trait%is_rigid = .false.
-      solid%geometry(2)%n_gp = 1
+      solid%trait%n_point(2) = 1
       call check_equal(error, strainless_element(solid), 2, "one point for five motions")
-      solid%geometry%n_node = 3
+      solid%trait%n_node = 3
       call check_equal(error, strainless_element(solid), 0, "of a triangle")
    end subroutine test_locking
 

@@ -3,6 +3,7 @@
 module test_stabilization
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
+   use emcon_element, only : element_geometry_t
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
@@ -10,7 +11,7 @@ module test_stabilization
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_of, motion_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid, only : solid_geometry, solid_init, solid_t
    use emcon_space, only : space_t
    use emcon_stabilization, only : stabilization_term_init, stabilization_term_t
    use emcon_stepper, only : stepper_t
@@ -265,6 +266,7 @@ contains
       real(wp), parameter :: strain = 1.0e-3_wp, modulus = 100.0_wp*0.7_wp/(1.3_wp*0.4_wp)
       real(wp), allocatable :: force(:), du(:, :)
       real(dp), allocatable :: tangent(:)
+      type(element_geometry_t) :: geometry
       real(wp) :: work
       integer :: k
 
@@ -276,8 +278,9 @@ contains
          du(1, :) = strain*sample%motion%x(1, :)
          allocate(force(size(du)), tangent(size(du)**2))
          call find(sample, du, work, force, tangent)
+         call solid_geometry(sample%solid, 1, geometry)
          call check_near(error, work, 0.5_wp*part*modulus*strain**2*merge(2.0_wp/0.7_wp, 1.0_wp, &
-            kinds(k) == "CAX4")*sum(sample%solid%geometry(1)%weight), 2.0_wp*strain, work, &
+            kinds(k) == "CAX4")*sum(geometry%weight), 2.0_wp*strain, work, &
             trim(kinds(k)) // ": work")
          deallocate(force, tangent)
          if (allocated(error)) return

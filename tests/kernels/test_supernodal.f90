@@ -4,9 +4,13 @@ module test_supernodal
    use, intrinsic :: iso_fortran_env, only : real32
    use check, only : check_near, check_true, test_case_t
    use emcon_cholmod, only : cholmod_t
-   use emcon_csr, only : csr_find, csr_multiply, csr_t
+   use emcon_csr, only : csr_find, csr_from_values, csr_multiply, csr_t
    use emcon_errors, only : error_t
+   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
+      blocks_has_panels, blocks_reach, blocks_reach_rows, diagonal_blocks_t
    use emcon_kinds, only : dp, wp
+   use emcon_row_panels, only : panels_add, panels_fill_products, panels_subtract_products, &
+      row_panel_t
    use emcon_sparse_solver, only : matrix_definite
    use sparse_samples, only : quad_mesh_matrix
    implicit none
@@ -27,6 +31,8 @@ contains
       tests = [ &
          test_case_t("both halves solve", test_solve), &
          test_case_t("a sparse right-hand side has the bits of a full one", test_reach), &
+         test_case_t("many right-hand sides together", test_rows), &
+         test_case_t("those of several bodies", test_rows_of_blocks), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
          test_case_t("short columns have no blocks", test_small), &
          test_case_t("one dense block of any width", test_dense), &
@@ -88,6 +94,93 @@ contains
          if (allocated(error)) return
       end do
    end subroutine check_reach
+
+   !> W of rows of neighbours and of unknowns far apart, one of them empty: its products with itself
+   !> and with vectors are those of one right-hand side after the other.
+   subroutine test_rows(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (.not. allocated(error)) call check_rows(a, 1, error)
+   end subroutine test_rows
+
+   !> Two meshes that do not meet, with rows across both.
+   subroutine test_rows_of_blocks(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a, twice
+      integer :: m
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (allocated(error)) return
+      m = size(a%column)
+      twice%n_row = 2*n
+      twice%n_col = 2*n
+      twice%row_start = [a%row_start, m + a%row_start(2:)]
+      twice%column = [a%column, n + a%column]
+      twice%value = [a%value, 3.0_dp*a%value]
+      call check_rows(twice, 2, error)
+   end subroutine test_rows_of_blocks
+
+   subroutine check_rows(a, n_block, error)
+      type(csr_t), intent(in) :: a
+      integer, intent(in) :: n_block             !! that it falls apart into
+      type(error_t), allocatable, intent(inout) :: error
+      integer, parameter :: n_row = 60
+      type(diagonal_blocks_t) :: blocks
+      type(row_panel_t), allocatable :: panel(:)
+      type(csr_t) :: rows
+      real(dp), allocatable :: w(:, :), part(:), y(:), expected(:)
+      real(dp), dimension(n_row, n_row) :: products, lower
+      real(dp) :: mu(n_row), found(n_row), value(3*n_row)
+      integer, allocatable :: index(:)
+      integer :: i, k, m, column(3*n_row), row(3*n_row)
+      logical :: is_new, is_singular
+
+      allocate(cholmod_t :: blocks%kind)
+      blocks%kind%symmetry = matrix_definite
+      blocks%may_be_rough = .true.
+      call blocks_analyse(blocks, a, is_new, error)
+      if (.not. allocated(error)) call blocks_factorise(blocks, a, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, blocks%n_block == n_block .and. blocks_has_panels(blocks), "panels")
+      call random_number(value)
+      do k = 1, n_row
+         row(3*k - 2:3*k) = merge(0, k, k == 7)
+         column(3*k - 2:3*k) = 1 + modulo([97*k, 97*k + 1, 5*k*a%n_row/7], a%n_row)
+      end do
+      call csr_from_values(rows, n_row, a%n_row, row, column, real(value, wp))
+      allocate(w(a%n_row, n_row), source=0.0_dp)
+      allocate(index(a%n_row), part(a%n_row))
+      do i = 1, n_row
+         associate (first => rows%row_start(i) + 1, last => rows%row_start(i + 1))
+            if (last < first) cycle
+            call blocks_reach(blocks, rows%column(first:last), rows%value(first:last), m, index, &
+               part, error)
+         end associate
+         if (allocated(error)) return
+         w(index(:m) + 1, i) = part(:m)
+      end do
+      call blocks_reach_rows(blocks, rows, n_row, panel, error)
+      if (allocated(error)) return
+      call panels_fill_products(panel, products)
+      lower = matmul(transpose(w), w)
+      do k = 2, n_row
+         lower(:k - 1, k) = 0.0_dp
+      end do
+      call check_near(error, real(products, wp), real(lower, wp), tol, 1.0_wp, "W^T W")
+      y = w(:, 3) - 0.5_dp*w(:, 40)
+      mu = 1.0_dp
+      found = mu
+      call panels_subtract_products(panel, y, found)
+      call check_near(error, real(found, wp), real(mu - matmul(transpose(w), y), wp), tol, 1.0_wp, &
+         "W^T y")
+      call random_number(mu)
+      expected = y + matmul(w, mu)
+      call panels_add(panel, mu, y)
+      call check_near(error, real(y, wp), real(expected, wp), tol, 1.0_wp, "W mu")
+      call blocks_free(blocks)
+   end subroutine check_rows
 
    subroutine test_powers_of_two(error)
       type(error_t), allocatable, intent(out) :: error

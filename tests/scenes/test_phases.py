@@ -22,7 +22,8 @@ def table(run):
     """Rows of the table at the end of the log: seconds, per cent, and what was counted."""
     lines = run.log.splitlines()
     (start,) = [k for k, line in enumerate(lines) if line.startswith("phase  ")]
-    rows = [line.split(maxsplit=3) for line in lines[start + 1:]]
+    (end,) = [k for k, line in enumerate(lines) if line.startswith("memory: ")]
+    rows = [line.split(maxsplit=3) for line in lines[start + 1:end]]
     return {name: (float(seconds), float(share), "".join(rest))
             for name, seconds, share, *rest in rows}
 

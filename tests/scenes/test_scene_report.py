@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from plain_scenes import AUTO, Scene
 from scene_tools import DECKS, ROOT, Deck, emcon, run_deck
+from space_mesh import Block
 
 from emcon import Stepper
 
@@ -154,6 +155,35 @@ def test_the_memory_is_that_of_a_run():
     rows = [line.split() for line in done.stdout.splitlines()[1:]]
     assert len(rows) == 2
     assert all(1/1.5 < float(row[6]) < 1.5 for row in rows)
+
+
+def test_what_takes_memory_is_told(tmp_path):
+    """Of bodies in space: at least the entries of the matrix, places of nodes, a deck's own text; in
+    proportion to the elements; and all of it is no more than the process has held."""
+    found = []
+    for n in (10, 14):
+        deck = tmp_path/f"cube{n}.inp"
+        mesh = Block("C3D8", (n, n, n), (1, 1, 1))
+        held = "".join(f"{k}, 1, 3\n" for k in mesh.on(0, 0))
+        deck.write_text(mesh.deck(
+            "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n", f"*BOUNDARY\n{held}*STEP, NLGEOM\n"
+            "*DYNAMIC, DIRECT\n0.01, 0.01\n*DLOAD\nALL, GRAV, 1., 0., 0., -1.\n*END STEP\n"))
+        told = report(deck)
+        (memory,), (sizes,) = told["memory"], told["sizes"]
+        del memory["text"]
+        most, rest = memory.pop("most"), memory.pop("rest")
+        assert sum(memory.values()) + rest < most
+        assert memory["contact"] < 0.01 and memory["factors"] > memory["matrix"]/4
+        entries = sizes["matrix_entries"]
+        assert 12*entries < memory["matrix"]*2**20 < 18*entries
+        text = deck.stat().st_size
+        assert text < memory["scene"]*2**20 < 10*text
+        found.append(memory["elements"]*2**20/n**3)
+        run = run_deck(deck, tmp_path)
+        assert run.verdict["memory"]["elements"] == pytest.approx(memory["elements"], rel=0.05)
+        assert run.log.splitlines()[-1].startswith("memory: deck and mesh ")
+    assert found[1] == pytest.approx(found[0], rel=0.1)
+    assert found[1] < 2500
 
 
 def block(n, force=10.0):

@@ -70,7 +70,7 @@ def table(path):
 def verdict(path):
     """NAME.json without its seconds and counts."""
     found = json.loads(path.read_bytes())
-    return json.dumps({k: v for k, v in found.items() if k not in ("seconds", "counts")}).encode()
+    return json.dumps({k: v for k, v in found.items() if k not in ("seconds", "counts", "memory")}).encode()
 
 
 def arrays(path):
