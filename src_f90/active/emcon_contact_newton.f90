@@ -10,15 +10,14 @@ module emcon_contact_newton
       condensation_renew, condensation_t, condensation_take
    use emcon_constraint, only : condition_rate, most_slips
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
-      constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
    use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_force, contact_problem_status, contact_problem_stiffness, contact_problem_t
+      contact_problem_force, contact_problem_status, contact_problem_t
+   use emcon_contact_rest, only : contact_rest_defect, contact_rest_gather, contact_rest_missed
    use emcon_contact_trials, only : contact_slope_t
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
-   use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
-      contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
+   use emcon_coulomb_law, only : coulomb_t, slip_status_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_may_provide, factor_policy_provide
@@ -378,8 +377,10 @@ contains
       call phase_leave(system%phases, left)
       call newton_pick_residual(newton, system, set)
       call newton_measure_forces(newton, system, set, motion)
-      call find_defect(self, set, motion, defect, rounded)
-      call find_missed(self, system, set, missed)
+      call contact_rest_defect(self%status, set, motion, defect, rounded)
+      missed = 0.0_wp
+      if (self%is_condensed) call contact_rest_missed(self%law, self%problem, set, &
+         maxval(system%response%rounding), missed)
       self%rest%size = max(relative_size(newton%residual, newton%forces), defect, missed)
       self%is_rounding = relative_size(newton%residual, newton%rounding) <= round_off &
          .and. rounded <= round_off .and. missed <= newton%convergence%tolerance
@@ -387,84 +388,6 @@ contains
       if (.not. newton%is_idle) self%is_rounding = self%is_rounding .and. &
          self%rest%size <= most_rounding
    end subroutine measure
-
-   !> What rows that are to hold are off by at worst, and by how much those are closed that are not,
-   !> over edges and over what they are computed from.
-   subroutine find_defect(self, set, motion, defect, rounded)
-      type(contact_newton_t), intent(in) :: self
-      type(constraint_set_t), intent(in) :: set
-      type(motion_t), intent(in) :: motion       !! evaluated
-      real(wp), intent(out) :: defect, rounded
-      type(slip_status_t) :: status
-      real(wp) :: off
-      integer :: k
-
-      defect = 0.0_wp
-      rounded = 0.0_wp
-      do k = 1, set%n_row
-         off = abs(set%defect(k))
-         associate (condition => set%condition(k), slip => set%slip(k))
-            if (condition > set%n_permanent) then
-               status = self%status(condition - set%n_permanent)
-               if (slip == 0 .and. status%kind == contact_open) off = max(0.0_wp, -set%defect(k))
-               if (slip > 0 .and. status%kind == contact_rests) off &
-                  = abs(set%item(condition)%slip(slip))
-               if (slip > 0 .and. any(status%kind == [contact_open, contact_free, &
-                  contact_slides])) off = 0.0_wp
-            end if
-            defect = max(defect, off/set%item(condition)%size)
-            rounded = max(rounded, off/constraints_rounding(set, motion, k))
-         end associate
-      end do
-   end subroutine find_defect
-
-   !> How far the forces that there are miss the laws with the gaps and slips that there are, over
-   !> the largest of them, in the stiffness of the last condensation; 0 before there is one.
-   subroutine find_missed(self, system, set, missed)
-      type(contact_newton_t), intent(in) :: self
-      type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(in) :: set
-      real(wp), intent(out) :: missed
-      type(contact_trial_t) :: at
-      real(wp), dimension(0:self%problem%n_slip, size(self%status)) :: force, defect
-      real(wp) :: stiffness
-      integer :: k
-
-      missed = 0.0_wp
-      if (.not. self%is_condensed) return
-      call gather(set, set%lam, force)
-      call gather(set, set%defect, defect)
-      associate (n_slip => self%problem%n_slip, first => set%n_permanent)
-         do k = 1, size(self%status)
-            stiffness = contact_problem_stiffness(self%problem, k)
-            at%rounding = slip_rounding*set%item(first + k)%size
-            at%lam = force(0, k)
-            at%gap = defect(0, k)
-            if (abs(at%gap) <= at%rounding) at%gap = 0.0_wp
-            at%tau(:n_slip) = force(1:, k)
-            at%slip_target(:n_slip) = self%problem%slip_target(:, k)
-            at%slip(:n_slip) = at%slip_target(:n_slip) - defect(1:, k)
-            missed = max(missed, coulomb_violation(at, self%law(k)%mu*set%item(first + k)%normal, &
-               stiffness))
-         end do
-      end associate
-      ! Where nothing is loaded all forces are round-off.
-      if (missed <= round_off*maxval(system%response%rounding)) missed = 0.0_wp
-      if (missed > 0.0_wp) missed = missed/max(maxval(abs(force)), tiny(missed))
-   end subroutine find_missed
-
-   !> Values of the rows of contacts, contact by contact; 0 where there is no row.
-   pure subroutine gather(set, of_row, of_contact)
-      type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: of_row(:)          !! (n_row)
-      real(wp), intent(inout) :: of_contact(0:, :)       !! (0:n_slip, n)
-      integer :: k
-
-      of_contact = 0.0_wp
-      do k = set%n_permanent + 1, set%n_row
-         of_contact(set%slip(k), set%condition(k) - set%n_permanent) = of_row(k)
-      end do
-   end subroutine gather
 
    !> The first correction meets prescribed motion by the tangent at its start.
    subroutine add_driven(newton, system, set, motion)
@@ -626,9 +549,9 @@ contains
       associate (problem => self%problem, first => set%n_permanent, w => self%condensation%w)
          problem%w = 0.0_wp
          problem%free = 0.0_wp
-         call gather(set, set%lam, problem%base)
-         call gather(set, self%condensation%hold, problem%hold)
-         call gather(set, set%defect, problem%start)
+         call contact_rest_gather(set, set%lam, problem%base)
+         call contact_rest_gather(set, self%condensation%hold, problem%hold)
+         call contact_rest_gather(set, set%defect, problem%start)
          problem%start(1:, :) = problem%start(1:, :) - problem%slip_target
          place = m*(set%condition(first + 1:) - first - 1) + 1 + set%slip(first + 1:)
          do k = 1, size(w, 1)

@@ -168,25 +168,32 @@ contains
          jump%rubbed = taken - jump%taken
          jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
          moved = sum(abs(jump%rate) + abs(problem%free) + abs(change))
-         if (allocated(jump%stopping)) call leave_all_to_friction(jump, taken)
-         ! Impulses are as exact as their problem is solved.
-         jump%is_done = min(jump%lost, merge(sum(jump%taken + jump%rubbed), 0.0_wp, &
-            allocated(jump%stopping))) >= -met*maxval(abs(problem%base) + abs(more))*moved
+         moved = maxval(abs(problem%base) + abs(more))*moved
+         if (allocated(jump%stopping)) then
+            ! Where rates of gaps stay pushes take nothing over step and jump.
+            call leave_to_friction(jump, taken, jump%lost)
+            jump%is_done = sum(jump%taken + jump%rubbed) >= -rounded*moved
+         else
+            ! What friction seems to give comes from pushes: only the sum of both has a sign.
+            call leave_to_friction(jump, taken, max(0.0_wp, -sum(jump%taken + jump%rubbed)))
+            ! Impulses are as exact as their problem is solved.
+            jump%is_done = jump%lost >= -met*moved
+         end if
       end associate
    end subroutine measure_losses
 
-   !> Where rates of gaps stay pushes take nothing over step and jump: what these take together is
-   !> friction's, by contacts as it is `taken` there.
-   pure subroutine leave_all_to_friction(jump, taken)
+   !> Some of what pushes take is friction's, by contacts as it is `taken` there.
+   pure subroutine leave_to_friction(jump, taken, loss)
       type(rate_jump_t), intent(inout) :: jump
       real(wp), intent(in) :: taken(:)           !! (n) [M L^2/T^2]
+      real(wp), intent(in) :: loss               !! so much [M L^2/T^2]
       real(wp) :: part(size(taken))
 
       part = abs(taken)
       if (.not. sum(part) > 0.0_wp) part = 1.0_wp
-      jump%rubbed = jump%rubbed + jump%lost/sum(part)*part
-      jump%lost = 0.0_wp
-   end subroutine leave_all_to_friction
+      jump%rubbed = jump%rubbed + loss/sum(part)*part
+      jump%lost = jump%lost - loss
+   end subroutine leave_to_friction
 
    !> What impulses of 1 in gaps and slips move, such that conditions that always hold go on to
    !> hold, and W of the problem. A contact without friction has no slips to solve for.

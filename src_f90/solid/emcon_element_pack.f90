@@ -22,6 +22,7 @@ module emcon_element_pack
    type :: element_pack_t
       integer :: n = 0                           !! elements in it, 1..n_lane
       integer :: n_node = 0                      !! nodes of each
+      integer :: n_dim = 0                       !! of these
       integer :: n_gp = 0
       integer :: kind = 0                        !! of all of them
       integer :: law = 0                         !! of all of them
@@ -98,6 +99,7 @@ contains
       type(element_geometry_t), intent(in) :: geometry     !! of the first one
 
       self%n_node = geometry%n_node
+      self%n_dim = n_dim
       self%n_gp = geometry%n_gp
       allocate(self%node(n_lane, self%n_node), self%weight(n_lane, self%n_gp))
       if (n_dim == n_space) then

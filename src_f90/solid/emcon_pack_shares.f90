@@ -89,7 +89,7 @@ contains
       allocate(self%border(b))
       do k = 1, size(pack)
          if (self%place(k) == 0) cycle
-         associate (border => self%border(self%place(k)), n_dim => size(pack(k)%gradient, 2))
+         associate (border => self%border(self%place(k)), n_dim => pack(k)%n_dim)
             border%pack = k
             allocate(border%force(n_lane, n_dim, pack(k)%n_node), &
                border%magnitude(n_lane, n_dim, pack(k)%n_node), source=0.0_wp)

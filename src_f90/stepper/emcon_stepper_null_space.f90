@@ -35,6 +35,7 @@ contains
       type(csr_t) :: links
 
       self%has_null_space = .false.
+      if (.not. allocated(self%null_space)) allocate(self%null_space)
       allocate(redundant(0))
       call check_that(self%has_set, "no step was evaluated since the model was made, its " // &
          "unknowns changed, or constraints were selected", error)

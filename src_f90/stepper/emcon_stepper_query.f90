@@ -44,7 +44,7 @@ module emcon_stepper_query
       logical :: has_set = .false.               !! the constraints selected last are evaluated
       logical :: has_begun = .false.             !! a step of contact, by `query_begin_contact`
       type(host_set_t) :: host_set               !! of that step
-      type(null_space_t) :: null_space           !! of the last `query_null_space`
+      type(null_space_t), allocatable :: null_space   !! of the last `query_null_space`
       type(csr_t), allocatable :: map            !! freedoms of the nodes by the host's unknowns
       logical :: has_tangent = .false.           !! of the last evaluation
       real(wp) :: frequency = 0.0_wp             !! 1/h of the step of contact; 0: not known [1/T]
@@ -59,7 +59,7 @@ contains
       type(query_t), intent(inout) :: self
 
       call march_free(self%march)
-      call null_space_free(self%null_space)
+      if (allocated(self%null_space)) call null_space_free(self%null_space)
       call clear(self)
    end subroutine query_free
 
