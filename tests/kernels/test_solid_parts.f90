@@ -69,6 +69,7 @@ contains
          pack(k)%n_node = 3 + mod(k, 2)
          pack(k)%n_gp = merge(4, 1, mod(k, 3) == 0)
          allocate(pack(k)%node(n_lane, pack(k)%n_node), source=0)
+         pack(k)%n_dim = 2
          allocate(pack(k)%gradient(n_lane, 2, pack(k)%n_node, 1))
          do i = 1, pack(k)%n_node
             call draw_random(drawn)
@@ -151,6 +152,7 @@ contains
          pack(k)%n_node = 3
          pack(k)%n_gp = 1
          pack(k)%node = spread([1, 2, 3], 1, n_lane)
+         pack(k)%n_dim = 2
          allocate(pack(k)%gradient(n_lane, 2, 3, 1))
       end do
       call shares_lay_out(shares, pack, 3, 2)
