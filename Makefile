@@ -168,7 +168,7 @@ FFLAGS_OF_lanes := -O3 -g1 -fopenmp-simd -fno-trapping-math \
 FFLAGS_OF_streams := -O3 -g1 -fopenmp-simd $(VECTOR)
 
 # One element at a time, by arrays of its size: these are on the stack.
-FFLAGS_OF_elements := -O2 -g1 -fstack-arrays
+FFLAGS_OF_elements := -O3 -g1 -fstack-arrays $(VECTOR)
 
 # Numbers with many derivatives, added and multiplied term by term: several terms at a time.
 # -Wno-zerotrip: those without second derivatives have loops over none.

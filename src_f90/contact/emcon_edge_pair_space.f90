@@ -5,8 +5,8 @@
 !> docs/theory.md, section 14, eq. (51), and section 14.3.
 module emcon_edge_pair_space
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
-   use emcon_frame_vertex_space, only : at_eta, at_height, at_xi, frame_place, frame_vertex, &
-      frame_vertex_t
+   use emcon_frame_vertex_space, only : at_eta, at_height, at_xi, frame_of, frame_place, &
+      frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    implicit none
@@ -74,13 +74,17 @@ contains
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(edge_pair_gap_t), intent(out) :: gap
       type(frame_vertex_t) :: vertex
+      real(wp) :: tip(n_dim, 4), motion(n_dim, 4), second(n_frame_var, n_frame_var, 3)
 
-      call frame_vertex(tips_of(at), tips_of(way), leaves_second, vertex)
+      tip = tips_of(at)
+      motion = tips_of(way)
+      call frame_vertex(frame_of(tip(:, :3), motion(:, :3), leaves_second), tip(:, 4), &
+         motion(:, 4), vertex, second)
       gap%gap = side*vertex%f(at_height, :)
       gap%dgap = side*vertex%df(at_height)
       call first_to_nodes(side, vertex%g(:, at_height), gap%g)
       call first_to_nodes(side, vertex%c(:, at_height), gap%c)
-      if (.not. leaves_second) call second_to_nodes(side, vertex%h(:, :, at_height), gap%h)
+      if (.not. leaves_second) call second_to_nodes(side, second(:, :, at_height), gap%h)
    end subroutine edge_pair_gap
 
    !> Slip over a step along two directions in the plane of both edges, the first one along that of

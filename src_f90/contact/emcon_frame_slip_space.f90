@@ -4,7 +4,8 @@
 !> has forces without resultant and moment, and rigid turns are no slip. Source: docs/theory.md,
 !> section 14.3.
 module emcon_frame_slip_space
-   use emcon_frame_vertex_space, only : at_eta, at_xi, frame_vertex, frame_vertex_t, n_frame_var
+   use emcon_frame_vertex_space, only : at_eta, at_xi, frame_of, frame_vertex, frame_vertex_t, &
+      n_frame_var
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    implicit none
@@ -34,20 +35,21 @@ contains
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(frame_slip_t), intent(out) :: slip
       type(frame_vertex_t) :: place
-      real(wp) :: a(3), b(3), basis(3, 2)
+      real(wp) :: a(3), b(3), basis(3, 2), second(n_frame_var, n_frame_var, 3)
       integer :: k
 
       a = x(:, 2) - x(:, 1)
       b = x(:, 3) - x(:, 1)
       basis = tangent_basis(cross_product(a, b), along)
-      call frame_vertex(x, dx, leaves_second, place)
+      call frame_vertex(frame_of(x(:, :3), dx(:, :3), leaves_second), x(:, 4), dx(:, 4), place, &
+         second)
       do k = 1, 2
          associate (by_xi => dot_product(basis(:, k), a), by_eta => dot_product(basis(:, k), b))
             slip%f(k) = by_xi*place%df(at_xi) + by_eta*place%df(at_eta)
             slip%g(:, k) = by_xi*place%g(:, at_xi) + by_eta*place%g(:, at_eta)
             slip%c(:, k) = by_xi*place%c(:, at_xi) + by_eta*place%c(:, at_eta)
             if (leaves_second) cycle
-            slip%h(:, :, k) = by_xi*place%h(:, :, at_xi) + by_eta*place%h(:, :, at_eta)
+            slip%h(:, :, k) = by_xi*second(:, :, at_xi) + by_eta*second(:, :, at_eta)
          end associate
       end do
    end subroutine frame_slip

@@ -2,14 +2,15 @@
 !>
 !> Source: docs/theory.md, section 2 and eq. (43).
 module emcon_frame_vertex_space
-   use emcon_dgrad9, only : dg_affine, dg_area, dg_height, dg_t, difference, difference_t
+   use emcon_dgrad9, only : dg_affine, dg_area, dg_height, dg_plane, dg_t, difference, difference_t
    use emcon_dgrad9_first, only : affine_first => dg_affine, dg_first_t => dg_t, &
-      difference_first => difference, difference_first_t => difference_t, height_first => dg_height
+      difference_first => difference, difference_first_t => difference_t, &
+      height_first => dg_height, plane_first => dg_plane
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: frame_vertex_t, frame_vertex, frame_place, frame_places, &
+   public :: frame_t, frame_of, frame_vertex_t, frame_vertex, frame_place, frame_places, &
       frame_area_t, frame_area, frame_size
 
    !> Local numbers: coordinates along both vectors of the frame, height over their plane.
@@ -17,13 +18,21 @@ module emcon_frame_vertex_space
    !> Variables: both vectors of the frame and where the point is, from the origin of the frame.
    integer, parameter, public :: n_frame_var = 9
 
+   !> A frame over a step.
+   type :: frame_t
+      logical :: leaves_second = .true.          !! no second derivatives
+      real(wp) :: x(3) = 0.0_wp, dx(3) = 0.0_wp  !! where its origin starts, how it moves [L]
+      type(difference_t), private :: a, b        !! its vectors,
+      type(difference_first_t), private :: a_first, b_first
+      type(dg_first_t), private :: plane_first(4)      !! and what all points over it share
+      type(dg_t), allocatable, private :: plane(:)     !! (4) the same with second derivatives
+   end type frame_t
+
    type :: frame_vertex_t
       real(wp) :: f(3, 0:1) = 0.0_wp             !! at both ends of the step
       real(wp) :: df(3) = 0.0_wp                 !! how they change, to relative accuracy
       real(wp) :: g(n_frame_var, 3) = 0.0_wp     !! discrete gradients
       real(wp) :: c(n_frame_var, 3) = 0.0_wp     !! gradients at the end
-      !> (i, j, which) derivative of g(i, which) by variable j at the end; only if asked for
-      real(wp) :: h(n_frame_var, n_frame_var, 3)
    end type frame_vertex_t
 
    !> The area that both vectors of a frame span.
@@ -97,46 +106,65 @@ contains
       end do
    end subroutine frame_places
 
-   !> The place over a step. `x` are the origin, the tips of both vectors and the point.
-   pure subroutine frame_vertex(x, dx, leaves_second, vertex)
-      real(wp), intent(in) :: x(3, 4), dx(3, 4)  !! where they start, how they move [L]
+   !> The frame of an origin and the tips of both vectors.
+   pure function frame_of(x, dx, leaves_second) result(frame)
+      real(wp), intent(in) :: x(3, 3), dx(3, 3)  !! where they start, how they move [L]
       logical, intent(in) :: leaves_second       !! no second derivatives
+      type(frame_t) :: frame
+
+      frame%leaves_second = leaves_second
+      frame%x = x(:, 1)
+      frame%dx = dx(:, 1)
+      if (leaves_second) then
+         frame%a_first = difference_first(2, 1, x, dx)
+         frame%b_first = difference_first(3, 1, x, dx)
+         frame%plane_first = plane_first(frame%a_first, frame%b_first)
+      else
+         frame%a = difference(2, 1, x, dx)
+         frame%b = difference(3, 1, x, dx)
+         frame%plane = dg_plane(frame%a, frame%b)
+      end if
+   end function frame_of
+
+   !> The place of a point over a step.
+   pure subroutine frame_vertex(frame, x, dx, vertex, second)
+      type(frame_t), intent(in) :: frame
+      real(wp), intent(in) :: x(3), dx(3)        !! where it starts, how it moves [L]
       type(frame_vertex_t), intent(out) :: vertex
-      type(difference_t) :: a, b, d
+      !> (i, j, which) derivative of g(i, which) by variable j at the end; only of a frame with such
+      real(wp), intent(inout) :: second(:, :, :)
+      type(difference_t) :: d
       type(dg_t) :: xi, eta, s(3)
       integer :: i
 
-      if (leaves_second) then
-         call vertex_first(x, dx, vertex)
+      if (frame%leaves_second) then
+         call vertex_first(frame, x, dx, vertex)
          return
       end if
-      a = difference(2, 1, x, dx)
-      b = difference(3, 1, x, dx)
-      d = difference(4, 1, x, dx)
-      call dg_affine(d, a, b, xi, eta)
-      s = [xi, eta, dg_height(d, a, b)]
+      d = difference_t(4, 1, x - frame%x, (x - frame%x) + (dx - frame%dx), dx - frame%dx)
+      call dg_affine(d, frame%a, frame%b, frame%plane, xi, eta)
+      s = [xi, eta, dg_height(d, frame%a, frame%b)]
       do i = at_xi, at_height
          vertex%f(i, :) = [s(i)%f0, s(i)%f1]
          vertex%df(i) = s(i)%df
          vertex%g(:, i) = s(i)%g
          vertex%c(:, i) = s(i)%c
-         vertex%h(:, :, i) = s(i)%h
+         second(:, :, i) = s(i)%h
       end do
    end subroutine frame_vertex
 
    !> The same without second derivatives.
-   pure subroutine vertex_first(x, dx, vertex)
-      real(wp), intent(in) :: x(3, 4), dx(3, 4)
+   pure subroutine vertex_first(frame, x, dx, vertex)
+      type(frame_t), intent(in) :: frame
+      real(wp), intent(in) :: x(3), dx(3)
       type(frame_vertex_t), intent(inout) :: vertex
-      type(difference_first_t) :: a, b, d
+      type(difference_first_t) :: d
       type(dg_first_t) :: xi, eta, s(3)
       integer :: i
 
-      a = difference_first(2, 1, x, dx)
-      b = difference_first(3, 1, x, dx)
-      d = difference_first(4, 1, x, dx)
-      call affine_first(d, a, b, xi, eta)
-      s = [xi, eta, height_first(d, a, b)]
+      d = difference_first_t(4, 1, x - frame%x, (x - frame%x) + (dx - frame%dx), dx - frame%dx)
+      call affine_first(d, frame%a_first, frame%b_first, frame%plane_first, xi, eta)
+      s = [xi, eta, height_first(d, frame%a_first, frame%b_first)]
       do i = at_xi, at_height
          vertex%f(i, :) = [s(i)%f0, s(i)%f1]
          vertex%df(i) = s(i)%df

@@ -20,6 +20,8 @@ module emcon_mortar_slave_space
       integer, allocatable :: start(:)                !! (n + 1) triangles of each:
       integer, allocatable :: triangle(:)             !! start(i) to start(i + 1) - 1
       integer, allocatable :: vertex(:)               !! the same: which vertex of its facet it is
+      integer, allocatable :: owner(:, :)             !! (vertex, facet) its constraint; 0: none,
+      integer, allocatable :: entry(:, :)             !! and where that has the facet's triangles
       !> (2, n) a direction along the surface at each, in the sides of its first facet at its vertex
       real(wp), allocatable :: along(:, :)
    end type mortar_slave_t
@@ -35,6 +37,7 @@ contains
       call facet_split_init(self%split, facets)
       call facet_weights_init(self%weights, facets, self%split, x)
       call list_vertices(self, facets, x)
+      call list_owners(self)
       call find_directions(self, facets%node, x)
    end subroutine mortar_slave_init
 
@@ -66,6 +69,24 @@ contains
          end do
       end do
    end subroutine list_vertices
+
+   !> The constraints of each facet.
+   pure subroutine list_owners(self)
+      class(mortar_slave_t), intent(inout) :: self
+      integer :: f, i, k
+
+      allocate(self%owner, self%entry, mold=self%weights%node)
+      self%owner = 0
+      self%entry = 0
+      do i = 1, size(self%node)
+         do k = self%start(i), self%start(i + 1) - 1
+            f = self%split%facet(self%triangle(k))
+            if (self%triangle(k) /= self%split%start(f)) cycle
+            self%owner(self%vertex(k), f) = i
+            self%entry(self%vertex(k), f) = k
+         end do
+      end do
+   end subroutine list_owners
 
    !> A direction at each vertex: the first axis in the reference, as near as it can be along the
    !> surface; where that is normal, another one.

@@ -22,7 +22,9 @@ module emcon_mortar_space
    use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
    use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
       mortar_slip_shift, mortar_slip_sight, mortar_slip_t
-   use emcon_mortar_sum_space, only : mortar_sight, mortar_sum, sight_t
+   use emcon_mortar_sum_space, only : mortar_add_facet, mortar_begin_sum, mortar_facet_sums, &
+      mortar_sight, sight_t
+   use emcon_patch_gap_space, only : patch_sums_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
    use emcon_patch_stencil_space, only : patch_stencil_gather
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -377,8 +379,11 @@ contains
       type(sight_t), allocatable :: sight(:)     !! of the triangles that are asked
       integer :: slot(size(self%faces%stencil))  !! where each is in it; 0: nowhere
       integer, allocatable :: facet(:)
+      integer :: place(self%n_constraint)        !! of each among `wanted`; 0: nowhere
       integer :: f, k, t
 
+      place = 0
+      place(wanted) = [(k, k = 1, size(wanted))]
       call find_asked(self%faces, wanted, facet, slot)
       allocate(sight(maxval([0, slot])))
       do f = 1, size(facet)
@@ -394,8 +399,15 @@ contains
          end associate
       end do
       do k = 1, size(wanted)
-         call mortar_sum(self%faces, wanted(k), slot, sight, target(k) + self%offset &
-            + self%sagitta(wanted(k)), self%scale(wanted(k)), item(k))
+         call mortar_begin_sum(self%faces, wanted(k), slot, sight, item(k))
+      end do
+      do f = 1, size(facet)
+         associate (first => slot(self%faces%split%start(facet(f))), &
+               last => slot(self%faces%split%start(facet(f) + 1) - 1))
+            call add_facet(self, facet(f), sight(first:last), place, target, item)
+         end associate
+      end do
+      do k = 1, size(wanted)
          item(k)%size = self%state(wanted(k))%size
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
@@ -404,6 +416,27 @@ contains
             item(k))
       end do
    end subroutine mortar_evaluate
+
+   !> Add a facet to the conditions of its vertices.
+   pure subroutine add_facet(self, f, sight, place, target, item)
+      class(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: f
+      type(sight_t), intent(in) :: sight(:)      !! of its triangles
+      integer, intent(in) :: place(:)            !! (n_constraint) in the following; 0: none
+      real(wp), intent(in) :: target(:)          !! (n) [L]
+      type(condition_t), intent(inout) :: item(:)   !! (n)
+      type(patch_sums_t) :: sums(size(sight))
+      integer :: i, m
+
+      call mortar_facet_sums(self%faces, self%faces%split%start(f), sight, &
+         all(item%leaves_second), sums)
+      do m = 1, self%faces%weights%n(f)
+         i = self%faces%owner(m, f)
+         if (i == 0) cycle
+         if (place(i) > 0) call mortar_add_facet(self%faces, self%faces%entry(m, f), sight, sums, &
+            target(place(i)) + self%offset + self%sagitta(i), self%scale(i), item(place(i)))
+      end do
+   end subroutine add_facet
 
    !> The facets of constraints, and numbers for their triangles.
    pure subroutine find_asked(faces, wanted, facet, slot)

@@ -10,14 +10,13 @@ module emcon_mortar_sum_space
    use emcon_mortar_slave_space, only : mortar_slave_weight
    use emcon_mortar_slip_space, only : slip_sight_t
    use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_cover, &
-      patch_open_t
-   use emcon_patch_look_space, only : patch_t
-   use emcon_patch_moments_space, only : patch_area_t
-   use emcon_patch_spread_space, only : patch_spread, patch_uses, patch_weights
+      patch_open_sums, patch_open_t, patch_sums_t
+   use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
+      patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
    implicit none
    private
-   public :: sight_t, mortar_sight, mortar_sum
+   public :: sight_t, mortar_sight, mortar_facet_sums, mortar_begin_sum, mortar_add_facet
 
    !> Covered but for round-off: the dual multipliers are as they are.
    real(wp), parameter :: whole_cover = 256.0_wp*epsilon(1.0_wp)
@@ -27,8 +26,7 @@ module emcon_mortar_sum_space
       type(patch_open_t) :: open
       logical, allocatable :: is_used(:)              !! (n_node of the stencil) open depends on it
       integer, allocatable :: node(:)                 !! these,
-      real(wp), allocatable :: weight(:, :)           !! and what they are in it
-      type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
+      type(patch_spread_t) :: spread                  !! and what they are in it
       logical :: is_full = .false.                    !! its facet is covered, but for round-off
       logical :: is_blended = .false.                 !! between the linear multipliers and the dual
       type(slip_sight_t) :: slip                      !! with friction
@@ -62,81 +60,69 @@ contains
             end associate
             sight(k)%node = pack(stencil%node(:stencil%n_node), sight(k)%is_used)
             associate (open => sight(k)%open)
-               sight(k)%weight = patch_weights(stencil, open%vertex(:open%n_vertex), &
-                  sight(k)%is_used)
+               call patch_spread_list(stencil, open%vertex(:open%n_vertex), sight(k)%is_used, &
+                  sight(k)%spread)
             end associate
          end associate
       end do
       if (.not. self%is_dual) return
       sight%is_full = all(abs(part - 1.0_wp) <= whole_cover)
       sight%is_blended = any(part > 0.0_wp) .and. .not. sight%is_full
-      do k = 1, size(sight)
-         if (sight(k)%open%n_vertex == 0 .or. .not. sight(k)%is_blended) cycle
-         associate (patch => self%stencil(first + k - 1)%patch)
-            call gap_of(patch, sight(k)%open, [1.0_wp, 1.0_wp, 1.0_wp], .true., 0.0_wp, &
-               leaves_second, sight(k)%cover)
-         end associate
-      end do
    end subroutine mortar_sight
 
-   !> The gap of a triangle with a weight, or what of it is covered.
-   pure subroutine gap_of(patch, open, weight, of_cover, target, leaves_second, gap)
-      type(patch_t), intent(in) :: patch
-      type(patch_open_t), intent(inout) :: open
-      real(wp), intent(in) :: weight(3)
-      logical, intent(in) :: of_cover
-      real(wp), intent(in) :: target             !! [L]
-      logical, intent(in) :: leaves_second
-      type(patch_gap_t), intent(inout) :: gap
-      type(patch_area_t) :: area
-
-      area = patch%area
-      area%weight = weight
-      call patch_gap_of(open, area, of_cover, .not. of_cover, target, leaves_second, gap)
-   end subroutine gap_of
-
-   !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
-   pure subroutine mortar_sum(self, i, slot, sight, target, scale, item)
+   !> The sums of the triangles of a facet, from `first` on.
+   pure subroutine mortar_facet_sums(self, first, sight, leaves_second, sums)
       type(mortar_faces_t), intent(in) :: self
-      integer, intent(in) :: i                   !! 1..n
-      integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
-      type(sight_t), intent(inout) :: sight(:)   !! what triangles see
+      integer, intent(in) :: first               !! triangle of the slave's split
+      type(sight_t), intent(in) :: sight(:)      !! what the triangles of the facet see
+      logical, intent(in) :: leaves_second       !! no second derivatives are asked for
+      type(patch_sums_t), intent(out) :: sums(:) !! (triangles of the facet)
+      integer :: k
+
+      do k = 1, size(sight)
+         if (sight(k)%open%n_vertex > 0) call patch_open_sums(self%stencil(first + k - 1)%patch, &
+            sight(k)%open, leaves_second, sums(k))
+      end do
+   end subroutine mortar_facet_sums
+
+   !> Add a facet to the condition of one of its vertices, docs/theory.md, eq. (62).
+   pure subroutine mortar_add_facet(self, entry, sight, sums, target, scale, item)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: entry               !! `start` has its first triangle at this place
+      type(sight_t), intent(in) :: sight(:)      !! what its triangles see
+      type(patch_sums_t), intent(in) :: sums(:)  !! of them
       real(wp), intent(in) :: target             !! height to hold [L]
       real(wp), intent(in) :: scale              !! > 0, what the value is divided by [L^2]
       type(condition_t), intent(inout) :: item
       type(condition_t) :: cover, skew
       type(patch_gap_t) :: gap
-      integer :: f, k, n
+      real(wp), parameter :: whole(3) = 1.0_wp
+      real(wp) :: theta                          ! of the dual multipliers
+      integer :: k
 
-      call begin_condition(self, i, slot, sight, item)
-      cover%leaves_second = item%leaves_second
-      skew%leaves_second = item%leaves_second
-      do k = self%start(i), self%start(i + 1) - 1
-         associate (t => self%triangle(k), s => slot(self%triangle(k)))
-            f = self%split%facet(t)
-            n = self%split%start(f + 1) - self%split%start(f)
-            if (sight(s)%is_blended .and. t == self%split%start(f)) then
-               call condition_start(skew, item%node(:item%n_node), size(item%g, 1))
-               call condition_start(cover, item%node(:item%n_node), size(item%g, 1))
-            end if
-            if (sight(s)%open%n_vertex > 0) then
-               associate (open => sight(s)%open, patch => self%stencil(t)%patch)
-                  call gap_of(patch, open, mortar_slave_weight(self, k, merge(1.0_wp, 0.0_wp, &
-                     sight(s)%is_full)), .false., target, item%leaves_second, gap)
-                  call add_gap(sight(s), gap, scale, item)
-                  if (sight(s)%is_blended) then
-                     call gap_of(patch, open, self%weights%skew(:, self%vertex(k), t), .false., &
-                        target, item%leaves_second, gap)
-                     call add_gap(sight(s), gap, scale, skew)
-                     call add_gap(sight(s), sight(s)%cover, 0.5_wp*real(n, wp), cover)
-                  end if
-               end associate
-            end if
-            if (sight(s)%is_blended .and. t == self%split%start(f) + n - 1) &
-               call condition_add_cubed(item, cover, skew)
+      theta = merge(1.0_wp, 0.0_wp, sight(1)%is_full)
+      if (sight(1)%is_blended) then
+         cover%leaves_second = item%leaves_second
+         skew%leaves_second = item%leaves_second
+         call condition_start(cover, item%node(:item%n_node), size(item%g, 1))
+         call condition_start(skew, item%node(:item%n_node), size(item%g, 1))
+      end if
+      do k = 1, size(sight)
+         if (sight(k)%open%n_vertex == 0) cycle
+         associate (open => sight(k)%open, place => entry + k - 1, leaves => item%leaves_second)
+            call patch_gap_of(open, sums(k), mortar_slave_weight(self, place, theta), target, &
+               .false., leaves, gap)
+            call add_gap(sight(k), gap, scale, item)
+            if (.not. sight(k)%is_blended) cycle
+            call patch_gap_of(open, sums(k), self%weights%skew(:, self%vertex(place), &
+               self%triangle(place)), target, .false., leaves, gap)
+            call add_gap(sight(k), gap, scale, skew)
+            call patch_gap_of(open, sums(k), whole, 0.0_wp, .true., leaves, gap)
+            call add_gap(sight(k), gap, 0.5_wp*real(size(sight), wp), cover)
          end associate
       end do
-   end subroutine mortar_sum
+      if (sight(1)%is_blended) call condition_add_cubed(item, cover, skew)
+   end subroutine mortar_add_facet
 
    !> Add a gap of a triangle by `scale` to a condition that has its nodes.
    pure subroutine add_gap(sight, gap, scale, item)
@@ -149,16 +135,16 @@ contains
       do j = 1, size(place)
          place(j) = findloc(item%node(:item%n_node), sight%node(j), 1)
       end do
-      call patch_spread(gap, sight%weight, scale, place, item)
+      call patch_spread(gap, sight%spread, scale, place, item)
    end subroutine add_gap
 
    !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
    !> derivatives yet.
-   pure subroutine begin_condition(self, i, slot, sight, item)
+   pure subroutine mortar_begin_sum(self, i, slot, sight, item)
       type(mortar_faces_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n
       integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
-      type(sight_t), intent(in) :: sight(:)
+      type(sight_t), intent(in) :: sight(:)      !! what triangles see
       type(condition_t), intent(inout) :: item
       integer, allocatable :: list(:)
       integer :: k, m, n, pass
@@ -183,7 +169,7 @@ contains
       end associate
       call condition_start(item, list(:n), self%sides%slave%n_dim)
       item%is_mean = .true.
-   end subroutine begin_condition
+   end subroutine mortar_begin_sum
 
    !> Which nodes of a stencil gap or slip depend on.
    pure function uses(stencil, sight) result(is_used)

@@ -26,7 +26,8 @@ module emcon_patch_contact_space
    use emcon_patch_near_space, only : patch_scope_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
-   use emcon_patch_spread_space, only : patch_spread, patch_uses, patch_weights
+   use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
+      patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_height, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -378,6 +379,7 @@ contains
       type(condition_t), intent(inout) :: item
       real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
       type(patch_gap_t) :: gap
+      type(patch_spread_t) :: spread
       logical :: is_used(self%stencil(i)%n_node)
       integer :: k
 
@@ -399,8 +401,8 @@ contains
             item%g(:, :n) = 0.0_wp
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
-            call patch_spread(gap, patch_weights(stencil, gap%vertex, is_used), self%scale(i), &
-               [(k, k = 1, n)], item)
+            call patch_spread_list(stencil, gap%vertex, is_used, spread)
+            call patch_spread(gap, spread, self%scale(i), [(k, k = 1, n)], item)
             if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
                is_used(2:)), at, way, item)
             if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &

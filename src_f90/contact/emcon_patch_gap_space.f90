@@ -5,18 +5,17 @@
 !> The field over the frame of the patch is continuous, so its integral is smooth while the patch
 !> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (43) to (49).
 module emcon_patch_gap_space
-   use emcon_frame_vertex_space, only : at_eta, at_height, frame_area, frame_area_t, frame_vertex, &
-      frame_vertex_t, n_frame_var
+   use emcon_frame_vertex_space, only : at_eta, frame_area, frame_area_t, frame_of, frame_t, &
+      frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
+   use emcon_patch_field_space, only : field_t, place_field
    use emcon_patch_look_space, only : patch_t, place_vertices
-   use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moments, &
-      patch_products
-   use emcon_patch_sum_space, only : add_end, change_of_closing, change_of_parts, close_sum, &
-      closing_begin, closing_t, field_t, form_field, outer, place_field
+   use emcon_patch_moments_space, only : patch_misses, patch_moments, patch_products
+   use emcon_patch_sum_space, only : patch_sums_t, share_t, sums_make, sums_take
    implicit none
    private
    public :: patch_gap_t, patch_gap, patch_open_t, patch_open, patch_open_cover, &
-      patch_gap_of
+      patch_sums_t, patch_open_sums, patch_gap_of
 
    !> The integral of chi (height - target) over the patch by its area, over a step.
    type :: patch_gap_t
@@ -30,15 +29,15 @@ module emcon_patch_gap_space
       real(wp), allocatable :: h(:, :)           !! the same twice; only if asked for
    end type patch_gap_t
 
-   !> What the gaps of a patch over a step have in common, whatever their weights and targets are,
-   !> and room for those of one of them.
+   !> What the gaps of a patch over a step have in common, whatever their weights and targets are.
    type :: patch_open_t
       integer :: n_vertex = 0                    !! that they depend on
       integer, allocatable :: vertex(:)          !! (>= n_vertex) their numbers
       real(wp), allocatable, private :: chi(:)               !! (n_vertex)
       type(frame_vertex_t), allocatable, private :: at(:)    !! (n_vertex)
+      !> (., ., ., n_vertex) their second derivatives; of none unless they are asked for
+      real(wp), allocatable, private :: second(:, :, :, :)
       type(field_t), allocatable, private :: field(:)
-      type(closing_t), private :: closing
       type(frame_area_t), private :: area        !! of the frame, for an integral
    end type patch_open_t
 
@@ -53,10 +52,11 @@ contains
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(patch_gap_t), intent(out) :: gap
       type(patch_open_t) :: open
+      type(patch_sums_t) :: sums
 
       call patch_open(patch, x, dx, leaves_second, open)
-      call patch_gap_of(open, patch%area, patch%of_cover, patch%is_integral, target, &
-         leaves_second, gap)
+      call patch_open_sums(patch, open, leaves_second, sums)
+      call patch_gap_of(open, sums, patch%weight, target, .false., leaves_second, gap)
       gap%n_vertex = open%n_vertex
       gap%vertex = open%vertex(:open%n_vertex)
    end subroutine patch_gap
@@ -68,17 +68,20 @@ contains
       logical, intent(in) :: leaves_second       !! no gap with second derivatives is asked for
       type(patch_open_t), intent(out) :: open
       real(wp) :: place(3, patch%n_vertex, 0:1), corner(2, 3, 0:1)
-      integer :: end, j, k
+      type(frame_t) :: frame
+      integer :: end, j, k, n_second
 
       call place_vertices(patch, x, place(:, :, 0))
       call place_vertices(patch, x + dx, place(:, :, 1))
       call choose_fields(patch, place, open)
-      allocate(open%at(open%n_vertex))
+      frame = frame_of(x(:, :3), dx(:, :3), leaves_second)
+      n_second = merge(0, n_frame_var, leaves_second)
+      allocate(open%at(open%n_vertex), open%second(n_second, n_second, 3, open%n_vertex))
       do j = 1, open%n_vertex
-         associate (node => [1, 2, 3, 3 + open%vertex(j)])
-            call frame_vertex(x(:, node), dx(:, node), leaves_second, open%at(j))
+         associate (node => 3 + open%vertex(j))
+            call frame_vertex(frame, x(:, node), dx(:, node), open%at(j), open%second(:, :, :, j))
          end associate
-         call to_patch(patch, leaves_second, open%at(j))
+         call to_patch(patch, open%at(j), open%second(:, :, :, j))
       end do
       open%chi = patch%chi(open%vertex(:open%n_vertex))
       do k = 1, size(open%field)
@@ -89,9 +92,16 @@ contains
          end do
          call place_field(corner, open%field(k))
       end do
-      call closing_begin(open%at, open%field, open%closing)
-      if (patch%area%n_side == 3) call frame_area(x(:, :3), dx(:, :3), leaves_second, open%area)
+      if (is_integral(patch)) call frame_area(x(:, :3), dx(:, :3), leaves_second, open%area)
    end subroutine patch_open
+
+   !> Over a part of a slave facet heights are integrated, over the square of a node their mean is
+   !> taken.
+   pure logical function is_integral(patch)
+      type(patch_t), intent(in) :: patch
+
+      is_integral = patch%area%n_side == 3
+   end function is_integral
 
    !> What of a patch is covered at both ends, in its coordinates.
    pure function patch_open_cover(open) result(cover)
@@ -104,35 +114,41 @@ contains
          associate (f => open%field(k))
             do end = 0, 1
                cover(end) = cover(end) + dot_product(open%chi(f%vertex), matmul( &
-                  f%at_end(:, :, end), f%bare(:, end)))
+                  f%at_end(:, :, end), sum(f%moment(:, :, end), 1)))
             end do
          end associate
       end do
    end function patch_open_cover
 
+   !> The sums that the gaps of a patch are made of.
+   pure subroutine patch_open_sums(patch, open, leaves_second, sums)
+      type(patch_t), intent(in) :: patch
+      type(patch_open_t), intent(in) :: open     !! of it
+      logical, intent(in) :: leaves_second       !! no gap with second derivatives is asked for
+      type(patch_sums_t), intent(out) :: sums
+
+      call sums_make(patch%area, open%chi, open%at, open%field, leaves_second, sums)
+   end subroutine patch_open_sums
+
    !> The gap of a patch.
-   pure subroutine patch_gap_of(open, patch_area, of_cover, is_integral, target, leaves_second, &
-         gap)
-      type(patch_open_t), intent(inout) :: open  !! of the patch
-      type(patch_area_t), intent(in) :: patch_area   !! what that is, with its weight
-      logical, intent(in) :: of_cover, is_integral   !! as `patch_t` has them
+   pure subroutine patch_gap_of(open, sums, weight, target, of_cover, leaves_second, gap)
+      type(patch_open_t), intent(in) :: open     !! of the patch
+      type(patch_sums_t), intent(in) :: sums     !! of it
+      real(wp), intent(in) :: weight(:)          !! of each weight of the patch
       real(wp), intent(in) :: target             !! that heights are counted from [L]
+      logical, intent(in) :: of_cover            !! of 1 in place of heights, by the area: what is
+                                                 !! covered
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(patch_gap_t), intent(inout) :: gap
-      integer :: end, k
+      type(share_t) :: share
 
       call make_room(6 + 3*open%n_vertex, leaves_second, gap)
-      if (patch_area%n_side == 3) then
-         do k = 1, size(open%field)
-            associate (f => open%field(k))
-               do end = 0, 1
-                  f%moment(:, end) = matmul(patch_area%weight, f%products(:, :, end))
-               end do
-            end associate
-         end do
-      end if
-      call add_up(open, patch_area, of_cover, target, leaves_second, gap)
-      if (is_integral) call times_area(open%area, leaves_second, gap)
+      call sums_take(sums, weight, target, of_cover, leaves_second, share)
+      gap%f0 = share%f(0)
+      gap%f1 = share%f(1)
+      call gather_first(open%at, share%by, share%end_by, gap)
+      if (.not. leaves_second) call gather_second(open, share%by, share%change, gap)
+      if (sums%n_weight > 1 .and. .not. of_cover) call times_area(open%area, leaves_second, gap)
    end subroutine patch_gap_of
 
    !> No gap yet, of `n` variables.
@@ -165,14 +181,19 @@ contains
       type(patch_gap_t), intent(inout) :: gap
       real(wp) :: mean, mean_area
       integer, parameter :: n = 6
+      integer :: j
 
       mean = 0.5_wp*(gap%f0 + gap%f1)
       mean_area = 0.5_wp*(area%f(0) + area%f(1))
       if (.not. leaves_second) then
-         gap%h = mean_area*gap%h
-         gap%h(:, :n) = gap%h(:, :n) + 0.5_wp*outer(gap%g, area%c)
-         gap%h(:n, :) = gap%h(:n, :) + 0.5_wp*outer(area%g, gap%c)
-         gap%h(:n, :n) = gap%h(:n, :n) + mean*area%h
+         do j = 1, size(gap%h, 2)
+            gap%h(:, j) = mean_area*gap%h(:, j)
+            if (j <= n) then
+               gap%h(:, j) = gap%h(:, j) + (0.5_wp*area%c(j))*gap%g
+               gap%h(:n, j) = gap%h(:n, j) + mean*area%h(:, j)
+            end if
+            gap%h(:n, j) = gap%h(:n, j) + (0.5_wp*gap%c(j))*area%g
+         end do
       end if
       gap%g = mean_area*gap%g
       gap%g(:n) = gap%g(:n) + mean*area%g
@@ -184,17 +205,17 @@ contains
    end subroutine times_area
 
    !> Coordinates in the patch in place of those in the frame.
-   pure subroutine to_patch(patch, leaves_second, at)
+   pure subroutine to_patch(patch, at, second)
       type(patch_t), intent(in) :: patch
-      logical, intent(in) :: leaves_second
       type(frame_vertex_t), intent(inout) :: at
+      real(wp), intent(inout) :: second(:, :, :) !! of its place
 
       associate (length => patch%length)
          at%f(:at_eta, :) = at%f(:at_eta, :)/length + patch%area%centre
          at%df(:at_eta) = at%df(:at_eta)/length
          at%g(:, :at_eta) = at%g(:, :at_eta)/length
          at%c(:, :at_eta) = at%c(:, :at_eta)/length
-         if (.not. leaves_second) at%h(:, :, :at_eta) = at%h(:, :, :at_eta)/length
+         second(:, :, :at_eta) = second(:, :, :at_eta)/length
       end associate
    end subroutine to_patch
 
@@ -218,7 +239,7 @@ contains
          associate (t => patch%triangle(:, k))
             field = field_t()
             call find_moments(patch, place(:2, t, :), field)
-            if (.not. any(abs(field%bare) > 0.0_wp)) cycle
+            if (.not. any(abs(field%moment) > 0.0_wp)) cycle
             n = n + 1
             do i = 1, 3
                if (number(t(i)) == 0) then
@@ -251,65 +272,13 @@ contains
       integer :: end
 
       do end = 0, 1
-         if (patch%area%n_side == 3) then
-            field%products(:, :, end) = patch_products(patch%area, corner(:, :, end))
-            field%bare(:, end) = sum(field%products(:, :, end), 1)
+         if (patch%area%n_weight > 1) then
+            field%moment(:, :, end) = patch_products(patch%area, corner(:, :, end))
          else
-            call patch_moments(patch%area, corner(:, :, end), field%moment(:, end), &
-               field%bare(:, end))
+            field%moment(1, :, end) = patch_moments(patch%area, corner(:, :, end))
          end if
       end do
    end subroutine find_moments
-
-   !> The sum over triangles, docs/theory.md, eqs. (46) and (47).
-   pure subroutine add_up(open, patch_area, of_cover, target, leaves_second, gap)
-      type(patch_open_t), intent(inout) :: open  !! its fields have their moments
-      type(patch_area_t), intent(in) :: patch_area
-      logical, intent(in) :: of_cover
-      real(wp), intent(in) :: target             !! [L]
-      logical, intent(in) :: leaves_second
-      type(patch_gap_t), intent(inout) :: gap
-      real(wp), dimension(3, open%n_vertex) :: by, end_by
-      real(wp), dimension(open%n_vertex) :: chi, flat !! of heights, and of 1
-      real(wp) :: corner(2, open%n_vertex)       !! at the end
-      real(wp) :: height(open%n_vertex, 0:1)
-      real(wp), allocatable :: change(:, :)
-      integer :: k
-
-      chi = open%chi
-      flat = 0.0_wp
-      if (of_cover) then
-         flat = chi
-         chi = 0.0_wp
-      end if
-      do k = 1, open%n_vertex
-         corner(:, k) = open%at(k)%f(:at_eta, 1)
-         height(k, :) = open%at(k)%f(at_height, :)
-      end do
-      by = 0.0_wp
-      end_by = 0.0_wp
-      do k = 1, size(open%field)
-         associate (f => open%field(k), v => open%field(k)%vertex)
-            call form_field(chi(v), flat(v), target, height(v, :), f)
-            gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
-            gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
-            by(at_height, v) = by(at_height, v) + chi(v)*f%part
-            by(:at_eta, v) = by(:at_eta, v) - outer(sum(f%slope, 2)/2.0_wp, f%part)
-            call add_end(chi(v), f, end_by)
-         end associate
-      end do
-      associate (closing => open%closing)
-         call close_sum(open%field, closing)
-         by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta) &
-            *closing%way
-         call gather_first(open%at, by, end_by, gap)
-         if (leaves_second) return
-         allocate(change(3*open%n_vertex, 3*open%n_vertex))
-         call change_of_parts(patch_area, chi, corner, open%field, change)
-         call change_of_closing(patch_area, chi, corner, open%field, closing, change)
-      end associate
-      call gather_second(open%at, by, change, gap)
-   end subroutine add_up
 
    !> First derivatives by the frame and by the vertices.
    pure subroutine gather_first(at, by, end_by, gap)
@@ -327,32 +296,42 @@ contains
       end do
    end subroutine gather_first
 
-   !> Second derivatives by the frame and by the vertices.
-   pure subroutine gather_second(at, by, change, gap)
-      type(frame_vertex_t), intent(in) :: at(:)
-      real(wp), intent(in) :: by(:, :), change(:, :)
+   !> Second derivatives by the frame and by the vertices: G change C^T, and those of the places.
+   pure subroutine gather_second(open, by, change, gap)
+      type(patch_open_t), intent(in) :: open
+      real(wp), intent(in), contiguous :: by(:, :), change(:, :)
       type(patch_gap_t), intent(inout) :: gap
-      real(wp) :: sums(3, 6 + 3*size(at))        !! what places and heights of a vertex take
-      integer :: column(n_frame_var), i, j, k, l
+      real(wp) :: left(6 + 3*open%n_vertex, 3*open%n_vertex)     ! G change
+      real(wp) :: frame(6, 3*open%n_vertex), total(6), own(n_frame_var, n_frame_var)
+      integer :: i, j, k, l, place(n_frame_var)
 
-      do j = 1, size(at)
-         sums = 0.0_wp
-         do l = 1, size(at)
-            column = places(l)
-            associate (by_l => change(3*j - 2:3*j, 3*l - 2:3*l), c => at(l)%c)
-               do i = 1, n_frame_var
-                  sums(:, column(i)) = sums(:, column(i)) + (by_l(:, 1)*c(i, 1) &
-                     + by_l(:, 2)*c(i, 2) + by_l(:, 3)*c(i, 3))
-               end do
+      do j = 1, open%n_vertex
+         frame(:, 3*j - 2:3*j) = open%at(j)%g(:6, :)
+      end do
+      do k = 1, size(left, 2)
+         total = 0.0_wp
+         do i = 1, size(left, 2)
+            total = total + frame(:, i)*change(i, k)
+         end do
+         left(:6, k) = total
+         do j = 1, open%n_vertex
+            associate (g => open%at(j)%g)
+               left(3*j + 4:3*j + 6, k) = g(7:, 1)*change(3*j - 2, k) &
+                  + g(7:, 2)*change(3*j - 1, k) + g(7:, 3)*change(3*j, k)
             end associate
          end do
-         associate (row => places(j), g => at(j)%g)
-            do i = 1, size(sums, 2)
-               gap%h(row, i) = gap%h(row, i) + (g(:, 1)*sums(1, i) + g(:, 2)*sums(2, i) &
-                  + g(:, 3)*sums(3, i))
-            end do
-            do k = 1, 3
-               gap%h(row, row) = gap%h(row, row) + by(k, j)*at(j)%h(:, :, k)
+      end do
+      do l = 1, open%n_vertex
+         place = places(l)
+         associate (c => open%at(l)%c, second => open%second(:, :, :, l), last => 3*l + 6)
+            own = by(1, l)*second(:, :, 1) + by(2, l)*second(:, :, 2) + by(3, l)*second(:, :, 3)
+            do i = 1, n_frame_var
+               associate (column => gap%h(:, place(i)))
+                  column = column + c(i, 1)*left(:, 3*l - 2) + c(i, 2)*left(:, 3*l - 1) &
+                     + c(i, 3)*left(:, 3*l)
+                  column(:6) = column(:6) + own(:6, i)
+                  column(last - 2:last) = column(last - 2:last) + own(7:, i)
+               end associate
             end do
          end associate
       end do

@@ -23,8 +23,7 @@ module emcon_patch_look_space
       real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
       real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
       type(patch_area_t) :: area
-      logical :: is_integral = .false.           !! of heights over its area, not by it
-      logical :: of_cover = .false.              !! of 1 in the place of heights: what is covered
+      real(wp) :: weight(3) = [1.0_wp, 0.0_wp, 0.0_wp]   !! of each weight of the area, in a gap
       !> (n_triangle + 1) of slip over each triangle, then over the nearest one: those of the start
       !> of the step; not allocated: nobody has asked yet
       real(wp), allocatable :: slip_share(:)
@@ -83,13 +82,12 @@ contains
       type(patch_t), intent(in) :: patch         !! that looks
       real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
       real(wp) :: share(patch%n_triangle)        !! their sum is 1, or 0 where nothing is covered
-      real(wp) :: place(3, patch%n_vertex), moment(3), bare(3)
+      real(wp) :: place(3, patch%n_vertex)
       integer :: k
 
       call place_vertices(patch, x, place)
       do k = 1, patch%n_triangle
-         call patch_moments(patch%area, place(:2, patch%triangle(:, k)), moment, bare)
-         share(k) = sum(bare)
+         share(k) = sum(patch_moments(patch%area, place(:2, patch%triangle(:, k))))
       end do
       if (any(share > 0.0_wp)) share = share/sum(share)
    end function patch_shares
@@ -190,7 +188,7 @@ contains
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
       real(wp), intent(out) :: height, cover
-      real(wp) :: moment(3), bare(3), share(3), corner(2, 3)
+      real(wp) :: moment(3), share(3), corner(2, 3)
       integer :: k, v
 
       height = 0.0_wp
@@ -199,7 +197,7 @@ contains
          associate (t => patch%triangle(:, k))
             corner = place(:2, t)
             if (patch_misses(patch%area, corner)) cycle
-            call patch_moments(patch%area, corner, moment, bare)
+            moment = patch_moments(patch%area, corner)
             do v = 1, 3
                share = moment(v)*barycentric(corner, unit_corner(:, v))
                height = height + dot_product(share, patch%chi(t)*place(3, t))

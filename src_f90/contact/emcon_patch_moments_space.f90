@@ -3,8 +3,9 @@
 !> corners.
 !>
 !> Places are given by coordinates y in which the patch of a node is the square 0 <= y1, y2 <= 1,
-!> and that of a part of a slave facet the triangle 0 <= y1, y2, y1 + y2 <= 1; a patch has a weight
-!> that is linear in them. Source: docs/theory.md, eqs. (45) and (49).
+!> and that of a part of a slave facet the triangle 0 <= y1, y2, y1 + y2 <= 1. A square has the
+!> weight 1, a triangle the three that are linear, and 1 at one of its corners.
+!> Source: docs/theory.md, eqs. (45) and (49).
 module emcon_patch_moments_space
    use emcon_kinds, only : wp
    use emcon_polygon_clip_space, only : most_corners, polygon_clip, polygon_inside, &
@@ -25,7 +26,7 @@ module emcon_patch_moments_space
       integer :: n_side = 4
       real(wp) :: side(3, 4) = square_sides      !! (3, >= n_side), as `polygon_clip` has them
       real(wp) :: centre = 0.5_wp                !! both of its coordinates
-      real(wp) :: weight(3) = 1.0_wp             !! at y = (0, 0), (1, 0) and (0, 1)
+      integer :: n_weight = 1
    end type patch_area_t
 
 contains
@@ -35,16 +36,8 @@ contains
       area%n_side = 3
       area%side(:, :3) = triangle_sides
       area%centre = 1.0_wp/3.0_wp
+      area%n_weight = 3
    end function patch_triangle
-
-   !> The weight of a patch at a place.
-   pure real(wp) function weight_at(area, y) result(weight)
-      type(patch_area_t), intent(in) :: area
-      real(wp), intent(in) :: y(2)
-
-      weight = area%weight(1) + (area%weight(2) - area%weight(1))*y(1) &
-         + (area%weight(3) - area%weight(1))*y(2)
-   end function weight_at
 
    !> Do they have no area in common, as one side of the patch shows?
    pure logical function patch_misses(area, corner)
@@ -55,17 +48,15 @@ contains
    end function patch_misses
 
    !> Moments of the common polygon with the functions 1 - y1 - y2, y1 and y2; exactly 0 where there
-   !> is none. The sum of those without weight is what of the patch is covered.
-   pure subroutine patch_moments(area, corner, moment, bare)
+   !> is none. Their sum is what of the patch is covered.
+   pure function patch_moments(area, corner) result(moment)
       type(patch_area_t), intent(in) :: area
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise
-      real(wp), intent(out) :: moment(3)         !! with the weight
-      real(wp), intent(out) :: bare(3)           !! without
-      real(wp) :: polygon(2, most_corners), middle(2), part, mean, weight(3), spread_of(3)
-      integer :: i, k, n
+      real(wp) :: moment(3)
+      real(wp) :: polygon(2, most_corners), middle(2), part
+      integer :: k, n
 
       moment = 0.0_wp
-      bare = 0.0_wp
       if (patch_misses(area, corner)) return
       call polygon_clip(area%side(:, :area%n_side), corner, polygon, n)
       do k = 2, n - 1
@@ -73,17 +64,11 @@ contains
             part = 0.5_wp*(a(1)*b(2) - a(2)*b(1))
          end associate
          middle = (polygon(:, 1) + polygon(:, k) + polygon(:, k + 1))/3.0_wp
-         weight(1) = weight_at(area, polygon(:, 1))
-         weight(2:) = [(weight_at(area, polygon(:, i)), i = k, k + 1)]
-         mean = sum(weight)/3.0_wp
-         spread_of(2:) = matmul(polygon(:, [1, k, k + 1]), weight - mean)/12.0_wp
-         spread_of(1) = -sum(spread_of(2:))
-         bare = bare + part*[1.0_wp - sum(middle), middle]
-         moment = moment + part*(mean*[1.0_wp - sum(middle), middle] + spread_of)
+         moment = moment + part*[1.0_wp - sum(middle), middle]
       end do
-   end subroutine patch_moments
+   end function patch_moments
 
-   !> Moments of the common polygon with the products of these functions, without weights.
+   !> Moments of the common polygon with the products of these functions.
    pure function patch_products(area, corner) result(product)
       type(patch_area_t), intent(in) :: area
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise
@@ -110,17 +95,16 @@ contains
       end do
    end function patch_products
 
-   !> How moments change with the corners: what each side sweeps of the patch.
-   pure subroutine patch_moment_slopes(area, corner, slope, bare)
+   !> How moments change with the corners, with each weight: what each side sweeps of the patch.
+   pure subroutine patch_moment_slopes(area, corner, slope)
       type(patch_area_t), intent(in) :: area
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise
-      real(wp), intent(out) :: slope(3, 2, 3)    !! (moment, coordinate, corner) with the weight
-      real(wp), intent(out) :: bare(3, 2, 3)     !! without
+      !> (moment, coordinate, corner, weight)
+      real(wp), intent(out) :: slope(3, 2, 3, area%n_weight)
       real(wp) :: t, y(2), at(3), low, high
-      integer :: i, k, next, pass
+      integer :: i, k, next, pass, w
 
       slope = 0.0_wp
-      bare = 0.0_wp
       do k = 1, 3
          next = 1 + mod(k, 3)
          associate (a => corner(:, k), along => corner(:, next) - corner(:, k))
@@ -130,13 +114,15 @@ contains
                do i = 1, 2
                   t = low + (high - low)*gauss(i)
                   y = a + t*along
-                  ! Half for the pass, half for the point of Gauss.
-                  at = (0.25_wp*(high - low))*[1.0_wp - sum(y), y]
-                  call add(bare(:, :, k), (1.0_wp - t)*at, along)
-                  call add(bare(:, :, next), t*at, along)
-                  at = weight_at(area, y)*at
-                  call add(slope(:, :, k), (1.0_wp - t)*at, along)
-                  call add(slope(:, :, next), t*at, along)
+                  at = [1.0_wp - sum(y), y]
+                  do w = 1, area%n_weight
+                     ! Half for the pass, half for the point of Gauss.
+                     associate (part => 0.25_wp*(high - low)*merge(1.0_wp, at(w), &
+                           area%n_weight == 1))
+                        call add(slope(:, :, k, w), (1.0_wp - t)*part*at, along)
+                        call add(slope(:, :, next, w), t*part*at, along)
+                     end associate
+                  end do
                end do
             end do
          end associate

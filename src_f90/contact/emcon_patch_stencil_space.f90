@@ -52,8 +52,8 @@ module emcon_patch_stencil_space
       real(wp), allocatable :: weight(:, :)
       !> (>= 3 + n_vertex) entries before each of these columns; (any) what is not 0 there, side by
       !> side in memory, and its rows
-      integer, allocatable, private :: start(:), row(:)
-      real(wp), allocatable, private :: entry(:)
+      integer, allocatable :: start(:), row(:)
+      real(wp), allocatable :: entry(:)
    end type patch_stencil_t
 
 contains
@@ -91,7 +91,6 @@ contains
       if (sides%frames%of_triangles) then
          self%patch%length = 1.0_wp
          self%patch%area = patch_triangle()
-         self%patch%is_integral = .true.
          self%n_strip = 1
          self%strip = narrow_flange
       end if
@@ -156,31 +155,32 @@ contains
 
    end subroutine make_patch
 
-   !> Where weights are not 0: few are.
+   !> Where weights are not 0: few are. Those of a point that is a sum are listed for each vertex.
    pure subroutine list_weights(self)
       type(patch_stencil_t), intent(inout) :: self
+      logical :: of(self%n_node - 1, 2 + self%patch%n_vertex)
       integer :: i, j, n
 
-      associate (of => abs(self%weight(2:self%n_node, :2 + self%patch%n_vertex)) > 0.0_wp)
-         n = count(of)
-         if (allocated(self%row)) then
-            if (size(self%start) <= size(of, 2) .or. size(self%row) < n) deallocate(self%start, &
-               self%row, self%entry)
-         end if
-         if (.not. allocated(self%row)) allocate(self%start(size(self%weight, 2) + 1), &
-            self%row(2*n), self%entry(2*n))
-         n = 0
-         do j = 1, size(of, 2)
-            self%start(j) = n
-            do i = 1, size(of, 1)
-               if (.not. of(i, j)) cycle
-               n = n + 1
-               self%row(n) = 1 + i
-               self%entry(n) = self%weight(1 + i, j)
-            end do
+      of = abs(self%weight(2:self%n_node, :2 + self%patch%n_vertex)) > 0.0_wp
+      of(:self%n_origin - 1, 3:) = .true.
+      n = count(of)
+      if (allocated(self%row)) then
+         if (size(self%start) <= size(of, 2) .or. size(self%row) < n) deallocate(self%start, &
+            self%row, self%entry)
+      end if
+      if (.not. allocated(self%row)) allocate(self%start(size(self%weight, 2) + 1), &
+         self%row(2*n), self%entry(2*n))
+      n = 0
+      do j = 1, size(of, 2)
+         self%start(j) = n
+         do i = 1, size(of, 1)
+            if (.not. of(i, j)) cycle
+            n = n + 1
+            self%row(n) = 1 + i
+            self%entry(n) = self%weight(1 + i, j)
          end do
-         self%start(size(of, 2) + 1) = n
-      end associate
+      end do
+      self%start(size(of, 2) + 1) = n
    end subroutine list_weights
 
    !> Flanges where the list ends as the surface does, and is seen; else it fades there.

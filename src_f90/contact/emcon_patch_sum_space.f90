@@ -1,291 +1,368 @@
 ! build: elements
-!> The sum over the triangles that a patch is over in a step, and how it changes: fields, what each
-!> vertex takes, and what closes the discrete gradient. Source: docs/theory.md, eqs. (46) to (49).
+!> The sum over the triangles that a patch is over in a step, and how it changes: what each vertex
+!> takes, and what closes the discrete gradient. Source: docs/theory.md, eqs. (46) to (49).
+!>
+!> But for what closes it the sum is linear in the weights of the patch, and in the target that
+!> heights are counted from: it is made once for each weight and both kinds of fields, of heights
+!> and of 1, and combined for whoever asks.
 module emcon_patch_sum_space
    use emcon_frame_vertex_space, only : at_eta, at_height, frame_vertex_t
    use emcon_kinds, only : wp
-   use emcon_patch_look_space, only : unit_corner
-   use emcon_patch_moments_space, only : patch_area_t, patch_moment_slopes
-   use emcon_polygon_clip_space, only : barycentric
+   use emcon_patch_field_space, only : field_slopes, field_slopes_t, field_t, form_field, &
+      formed_t, of_height, of_one
+   use emcon_patch_moments_space, only : patch_area_t
    implicit none
    private
-   public :: field_t, place_field, form_field, add_end, change_of_parts, closing_t, closing_begin, &
-      close_sum, change_of_closing, outer
+   public :: patch_sums_t, sums_make, sums_take, share_t
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
    !> A vertex whose triangles cover so much of the patch at both ends together has half its weight.
    real(wp), parameter :: some = 0.1_wp
 
-   !> One triangle over a step.
-   type :: field_t
-      integer :: vertex(3) = 0                   !! among those that count
-      real(wp) :: moment(3, 0:1) = 0.0_wp        !! over the part of the patch that it covers
-      real(wp) :: bare(3, 0:1) = 0.0_wp          !! the same without weights
-      real(wp) :: products(3, 3, 0:1) = 0.0_wp   !! of patches of facets: for each weight
-      real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the `unit_corner` [L]
-      real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
-      real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, in the mean
-      real(wp) :: at_end(3, 3, 0:1) = 0.0_wp     !! the same at the start and at the end
-      real(wp) :: part(3) = 0.0_wp               !! of the integral that each corner takes
-   end type field_t
-
    !> What is put on the ways of the vertices in the patch, and how it changes.
    type :: closing_t
       real(wp), allocatable :: weight(:)         !! (n_vertex) 0 to 1: as its triangles are covered
-      real(wp), allocatable :: weight_slope(:)   !! (n_vertex) by what they cover of the patch
       real(wp), allocatable :: way(:, :)         !! (2, n_vertex)
-      real(wp) :: factor = 0.0_wp                !! of weight times way [L]
-      real(wp) :: by_rest = 0.0_wp               !! its slope by the rest,
-      real(wp) :: by_square = 0.0_wp             !! and by the sum of weight times way squared
+      real(wp) :: square = 0.0_wp                !! the sum of weight times way squared
+      !> (3 n_vertex, n_vertex) slopes of the weights, and (3 n_vertex) those of the square
+      real(wp), allocatable :: weight_slope(:, :), by_square(:)
    end type closing_t
+
+   !> The sums of a patch, by weight and kind.
+   type :: patch_sums_t
+      integer :: n_weight = 1
+      integer :: n_kind = of_height              !! of gradients: where nothing fades 1 has none
+      real(wp) :: f(3, of_height:of_one, 0:1) = 0.0_wp   !! at both ends
+      real(wp) :: rest(3, of_height:of_one) = 0.0_wp     !! what moments gain
+      !> (3, n_vertex, weight, kind) by places and heights, in the mean and at the end
+      real(wp), allocatable :: by(:, :, :, :), end_by(:, :, :, :)
+      !> (3 n_vertex, 3 n_vertex, weight, kind) how the first changes, if asked for
+      real(wp), allocatable :: change(:, :, :, :)
+      real(wp), allocatable :: by_rest(:, :, :)  !! (3 n_vertex, weight, kind) slopes of the rest
+      real(wp), allocatable :: total(:, :, :)    !! (3, kind, n_field) values at both ends together
+      type(closing_t) :: closing
+   end type patch_sums_t
+
+   !> A combination of them.
+   type :: share_t
+      real(wp) :: f(0:1)
+      real(wp), allocatable :: by(:, :), end_by(:, :)    !! (3, n_vertex)
+      real(wp), allocatable :: change(:, :)              !! (3 n_vertex, 3 n_vertex), if asked for
+   end type share_t
 
 contains
 
-   !> Where the corners of a triangle are: their shares at the `unit_corner`.
-   pure subroutine place_field(corner, field)
-      real(wp), intent(in) :: corner(2, 3, 0:1)  !! at both ends
-      type(field_t), intent(inout) :: field
-      integer :: v, end
-
-      do v = 1, 3
-         do end = 0, 1
-            field%at_end(:, v, end) = barycentric(corner(:, :, end), unit_corner(:, v))
-         end do
-         field%share(:, v) = barycentric(sum(corner, 3)/2.0_wp, unit_corner(:, v))
-      end do
-   end subroutine place_field
-
-   !> The field of a triangle at both ends.
-   pure subroutine form_field(chi, flat, target, height, field)
-      real(wp), intent(in) :: chi(3), flat(3)    !! of heights, and of 1
-      real(wp), intent(in) :: target             !! [L]
-      real(wp), intent(in) :: height(3, 0:1)     !! of its corners [L]
-      type(field_t), intent(inout) :: field      !! in: with its moments, placed
-      real(wp) :: p(3)
-      integer :: v, end
-
-      do end = 0, 1
-         p = chi*(height(:, end) - target) + flat
-         do v = 1, 3
-            field%value(v, end) = dot_product(p, field%at_end(:, v, end))
-         end do
-         field%slope(:, end) = field%value(2:3, end) - field%value(1, end)
-      end do
-      field%part = matmul(field%share, sum(field%moment, 2)/2.0_wp)
-   end subroutine form_field
-
-   !> Add the gradient at the end by places and heights.
-   pure subroutine add_end(chi, field, by)
-      real(wp), intent(in) :: chi(3)             !! at its corners
-      type(field_t), intent(in) :: field         !! formed
-      real(wp), intent(inout) :: by(:, :)        !! (3, n_vertex)
-      real(wp) :: part(3)
-      integer :: v
-
-      part = 0.0_wp
-      do v = 1, 3
-         part = part + field%moment(v, 1)*field%at_end(:, v, 1)
-      end do
-      associate (to => field%vertex)
-         by(at_height, to) = by(at_height, to) + chi*part
-         by(:at_eta, to) = by(:at_eta, to) - outer(field%slope(:, 1), part)
-      end associate
-   end subroutine add_end
-
-   !> How what the vertices take changes with places and heights at the end.
-   pure subroutine change_of_parts(patch_area, chi, corner, field, change)
-      type(patch_area_t), intent(in) :: patch_area   !! what the patch is
+   !> Sum up what fields over a patch are.
+   pure subroutine sums_make(area, chi, at, field, leaves_second, sums)
+      type(patch_area_t), intent(in) :: area     !! what the patch is
       real(wp), intent(in) :: chi(:)             !! (n_vertex)
-      real(wp), intent(in) :: corner(:, :)       !! (2, n_vertex) at the end
-      type(field_t), intent(in) :: field(:)      !! the triangles, formed
-      real(wp), intent(out) :: change(:, :)      !! (3 n_vertex, 3 n_vertex)
-      real(wp) :: part(3, 9), slope(2, 9)
-      integer :: i, j, k
-
-      change = 0.0_wp
-      do k = 1, size(field)
-         associate (f => field(k), v => field(k)%vertex)
-            call change_of_field(patch_area, chi(v), corner(:, v), f, part, slope)
-            do i = 1, 3
-               do j = 1, 3
-                  associate (row => 3*(v(i) - 1), column => 3*(v(j) - 1), by => 3*(j - 1))
-                     change(row + at_height, column + 1:column + 3) = &
-                        change(row + at_height, column + 1:column + 3) &
-                        + chi(v(i))*part(i, by + 1:by + 3)
-                     change(row + 1:row + at_eta, column + 1:column + 3) = &
-                        change(row + 1:row + at_eta, column + 1:column + 3) &
-                        - outer(sum(f%slope, 2)/2.0_wp, part(i, by + 1:by + 3)) &
-                        - f%part(i)*slope(:, by + 1:by + 3)
-                  end associate
-               end do
-            end do
-         end associate
-      end do
-   end subroutine change_of_parts
-
-   !> How the parts of the corners of a triangle and its mean slope change with their places and
-   !> heights at the end.
-   pure subroutine change_of_field(patch_area, chi, corner, field, part, slope)
-      type(patch_area_t), intent(in) :: patch_area
-      real(wp), intent(in) :: chi(3)
-      real(wp), intent(in) :: corner(2, 3)       !! at the end
-      type(field_t), intent(in) :: field
-      real(wp), intent(out) :: part(3, 9), slope(2, 9)
-      real(wp) :: lean(2, 3), lean1(2, 3), mean(3)
-      real(wp), dimension(3, 2, 3) :: swept, bare
-      integer :: l, v
-
-      call patch_moment_slopes(patch_area, corner, swept, bare)
-      lean = gradients(field%share)
-      lean1 = gradients(field%at_end(:, :, 1))
-      mean = sum(field%moment, 2)/2.0_wp
-      part = 0.0_wp
-      slope = 0.0_wp
-      do l = 1, 3
-         associate (by => 3*(l - 1))
-            part(:, by + 1:by + at_eta) = 0.5_wp*matmul(field%share, swept(:, :, l))
-            do v = 1, 3
-               part(:, by + 1:by + at_eta) = part(:, by + 1:by + at_eta) &
-                  - (0.5_wp*mean(v)*field%share(l, v))*transpose(lean)
-            end do
-            slope(:, by + 1:by + at_eta) = -0.5_wp*outer(lean1(:, l), field%slope(:, 1))
-            slope(:, by + at_height) = 0.5_wp*chi(l)*lean1(:, l)
-         end associate
-      end do
-   end subroutine change_of_field
-
-   !> Gradients of the barycentric coordinates of a triangle.
-   pure function gradients(share) result(lean)
-      real(wp), intent(in) :: share(3, 3)        !! (j, v) of corner j at the `unit_corner`
-      real(wp) :: lean(2, 3)
-
-      lean(1, :) = share(:, 2) - share(:, 1)
-      lean(2, :) = share(:, 3) - share(:, 1)
-   end function gradients
-
-   !> The ways of the vertices, each by what it has to do with the patch: docs/theory.md, eq. (48).
-   pure subroutine closing_begin(at, field, closing)
-      type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
+      type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex) where they are
       type(field_t), intent(in) :: field(:)      !! the triangles, placed
-      type(closing_t), intent(out) :: closing
-      real(wp) :: area(size(at))
+      logical, intent(in) :: leaves_second       !! nobody asks how the sums change
+      type(patch_sums_t), intent(out) :: sums
+      type(formed_t) :: formed
+      real(wp) :: height(size(at), 0:1), corner(2, size(at)), covered(size(at))
       integer :: j, k
 
-      area = 0.0_wp
+      sums%n_weight = area%n_weight
+      sums%n_kind = merge(of_one, of_height, any(chi < 1.0_wp))
+      call make_room(sums, size(at), size(field), leaves_second)
+      call closing_begin(at, field, sums%closing, covered)
+      do j = 1, size(at)
+         corner(:, j) = at(j)%f(:at_eta, 1)
+         height(j, :) = at(j)%f(at_height, :)
+      end do
       do k = 1, size(field)
          associate (v => field(k)%vertex)
-            area(v) = area(v) + sum(field(k)%bare)
+            call form_field(sums%n_weight, chi(v), height(v, :), field(k), formed)
+            call add_values(chi(v), field(k), formed, sums)
+            sums%total(:, :, k) = sum(formed%value, 3)
+            if (.not. leaves_second) call add_changes(area, chi(v), corner(:, v), field(k), &
+               formed, sums)
          end associate
       end do
-      closing%weight = area/(area + some)
-      closing%weight_slope = some/(area + some)**2
-      allocate(closing%way(at_eta, size(at)))
-      do j = 1, size(at)
-         closing%way(:, j) = at(j)%df(:at_eta)
-      end do
-   end subroutine closing_begin
+      if (.not. leaves_second) call closing_change(covered, sums%closing)
+   end subroutine sums_make
 
-   !> What the gradient lacks, put on the ways of the vertices.
-   pure subroutine close_sum(field, closing)
-      type(field_t), intent(in) :: field(:)      !! the triangles, formed
-      type(closing_t), intent(inout) :: closing  !! begun
-      real(wp) :: rest, square, size_of, ratio
-      integer :: k
+   !> Nothing summed up yet.
+   pure subroutine make_room(sums, n_vertex, n_field, leaves_second)
+      type(patch_sums_t), intent(inout) :: sums  !! with its weights and kinds
+      integer, intent(in) :: n_vertex, n_field
+      logical, intent(in) :: leaves_second
 
-      rest = 0.0_wp
-      size_of = tiny(size_of)
-      do k = 1, size(field)
-         associate (f => field(k))
-            rest = rest + dot_product(f%moment(:, 1) - f%moment(:, 0), sum(f%value, 2)/2.0_wp)
-            size_of = max(size_of, maxval(sum(abs(f%value), 2)))
-         end associate
-      end do
-      ! By ways of round-off nothing is divided.
-      square = rounding + sum(spread(closing%weight, 1, at_eta)*closing%way**2)
-      ratio = (rest/(rounding*size_of))**2
-      ratio = merge(ratio/(1.0_wp + ratio), 1.0_wp, ratio <= huge(ratio))
-      closing%factor = ratio*rest/square
-      closing%by_rest = ratio*(3.0_wp - 2.0_wp*ratio)/square
-      closing%by_square = -closing%factor/square
-   end subroutine close_sum
+      associate (n => n_vertex, m => sums%n_weight)
+         allocate(sums%by(3, n, m, sums%n_kind), sums%end_by(3, n, m, sums%n_kind), source=0.0_wp)
+         allocate(sums%total(3, of_one, n_field))
+         if (leaves_second) return
+         allocate(sums%change(3*n, 3*n, m, sums%n_kind), sums%by_rest(3*n, m, of_one), &
+            sums%closing%weight_slope(3*n, n), source=0.0_wp)
+      end associate
+   end subroutine make_room
 
-   !> Add how the closing term changes.
-   pure subroutine change_of_closing(patch_area, chi, corner, field, closing, change)
-      type(patch_area_t), intent(in) :: patch_area   !! what the patch is
-      real(wp), intent(in) :: chi(:)             !! (n_vertex)
-      real(wp), intent(in) :: corner(:, :)       !! (2, n_vertex) at the end
-      type(field_t), intent(in) :: field(:)      !! the triangles, formed
-      type(closing_t), intent(in) :: closing     !! of `close_sum`
-      real(wp), intent(inout) :: change(:, :)    !! (3 n_vertex, 3 n_vertex)
-      real(wp) :: by_rest(3, size(chi)), by_square(3, size(chi)), area(3*size(chi), size(chi))
-      integer :: a, i, j, k
+   !> Add the values of a field, and its gradients by places and heights.
+   pure subroutine add_values(chi, field, formed, sums)
+      real(wp), intent(in) :: chi(3)             !! at its corners
+      type(field_t), intent(in) :: field
+      type(formed_t), intent(in) :: formed
+      type(patch_sums_t), intent(inout) :: sums
+      integer :: a, j, kind, w
 
-      by_rest = 0.0_wp
-      by_square = 0.0_wp
-      area = 0.0_wp
-      do k = 1, size(field)
-         call add_rest(patch_area, chi(field(k)%vertex), corner(:, field(k)%vertex), field(k), &
-            by_rest, area)
-      end do
-      do j = 1, size(chi)
-         associate (slope => closing%weight_slope(j)*area(:, j), way => closing%way(:, j))
-            by_square(:at_eta, j) = by_square(:at_eta, j) + 2.0_wp*closing%weight(j)*way
-            by_square = by_square + sum(way**2)*reshape(slope, shape(by_square))
-            do a = 1, at_eta
-               i = 3*(j - 1) + a
-               change(i, :) = change(i, :) + closing%factor*way(a)*slope
-               change(i, i) = change(i, i) + closing%factor*closing%weight(j)
+      do kind = of_height, of_one
+         associate (value => formed%value(:, kind, :))
+            do w = 1, sums%n_weight
+               sums%f(w, kind, 0) = sums%f(w, kind, 0) + dot_product(field%moment(w, :, 0), &
+                  value(:, 1))
+               sums%f(w, kind, 1) = sums%f(w, kind, 1) + dot_product(field%moment(w, :, 1), &
+                  value(:, 2))
+               sums%rest(w, kind) = sums%rest(w, kind) + 0.5_wp*dot_product( &
+                  field%moment(w, :, 1) - field%moment(w, :, 0), value(:, 1) + value(:, 2))
             end do
          end associate
       end do
-      by_rest = closing%by_rest*by_rest + closing%by_square*by_square
-      do j = 1, size(chi)
-         do a = 1, at_eta
-            i = 3*(j - 1) + a
-            change(i, :) = change(i, :) + closing%weight(j)*closing%way(a, j)*reshape(by_rest, &
-               [size(by_rest)])
-         end do
-      end do
-   end subroutine change_of_closing
-
-   !> Add how what a triangle leaves to the rest changes, and what of the patch it covers.
-   pure subroutine add_rest(patch_area, chi, corner, field, by_rest, area)
-      type(patch_area_t), intent(in) :: patch_area
-      real(wp), intent(in) :: chi(3)
-      real(wp), intent(in) :: corner(2, 3)       !! at the end
-      type(field_t), intent(in) :: field
-      real(wp), intent(inout) :: by_rest(:, :)   !! (3, n_vertex)
-      real(wp), intent(inout) :: area(:, :)      !! (3 n_vertex, n_vertex) of those at a vertex
-      real(wp) :: part(3)
-      real(wp), dimension(3, 2, 3) :: swept, bare
-      integer :: i, j, v
-
-      call patch_moment_slopes(patch_area, corner, swept, bare)
-      part = 0.0_wp
-      do v = 1, 3
-         part = part + 0.5_wp*(field%moment(v, 1) - field%moment(v, 0))*field%at_end(:, v, 1)
-      end do
-      do j = 1, 3
-         associate (to => by_rest(:, field%vertex(j)), at_j => 3*(field%vertex(j) - 1))
-            to(:at_eta) = to(:at_eta) + matmul(sum(field%value, 2)/2.0_wp, swept(:, :, j)) &
-               - part(j)*field%slope(:, 1)
-            to(at_height) = to(at_height) + part(j)*chi(j)
-            do i = 1, 3
-               associate (of => area(at_j + 1:at_j + at_eta, field%vertex(i)))
-                  of = of + sum(bare(:, :, j), 1)
+      do kind = of_height, sums%n_kind
+         do w = 1, sums%n_weight
+            do j = 1, 3
+               associate (by => sums%by(:, field%vertex(j), w, kind), part => formed%part(j, w), &
+                     end_by => sums%end_by(:, field%vertex(j), w, kind), &
+                     end_part => formed%end_part(j, w), slope => formed%slope(:, kind, :))
+                  do a = 1, at_eta
+                     by(a) = by(a) - 0.5_wp*(slope(a, 1) + slope(a, 2))*part
+                     end_by(a) = end_by(a) - slope(a, 2)*end_part
+                  end do
+                  if (kind /= of_height) cycle
+                  by(at_height) = by(at_height) + chi(j)*part
+                  end_by(at_height) = end_by(at_height) + chi(j)*end_part
                end associate
             end do
+         end do
+      end do
+   end subroutine add_values
+
+   !> Add how gradients and the rest change with the places and heights at the end.
+   pure subroutine add_changes(area, chi, corner, field, formed, sums)
+      type(patch_area_t), intent(in) :: area
+      real(wp), intent(in) :: chi(3)             !! at its corners
+      real(wp), intent(in) :: corner(2, 3)       !! at the end
+      type(field_t), intent(in) :: field
+      type(formed_t), intent(in) :: formed
+      type(patch_sums_t), intent(inout) :: sums
+      type(field_slopes_t) :: slopes
+      integer :: a, kind, l, w
+
+      call field_slopes(area, chi, corner, field, formed, slopes)
+      do kind = of_height, sums%n_kind
+         do w = 1, sums%n_weight
+            call add_change(chi, field%vertex, formed, slopes, w, kind, sums%change(:, :, w, kind))
+         end do
+      end do
+      do kind = of_height, of_one
+         do w = 1, sums%n_weight
+            call add_rest(chi, field%vertex, formed, slopes, w, kind, sums%by_rest(:, w, kind))
+         end do
+      end do
+      do l = 1, 3
+         do a = 1, at_eta
+            associate (slope => sums%closing%weight_slope(3*(field%vertex(l) - 1) + a, :))
+               slope(field%vertex) = slope(field%vertex) &
+                  + sum(slopes%moment(:, a, l, :sums%n_weight))
+            end associate
+         end do
+      end do
+   end subroutine add_changes
+
+   !> Of the gradient, for one weight and kind.
+   pure subroutine add_change(chi, vertex, formed, slopes, w, kind, change)
+      real(wp), intent(in) :: chi(3)             !! at the corners
+      integer, intent(in) :: vertex(3)           !! which they are
+      type(formed_t), intent(in) :: formed
+      type(field_slopes_t), intent(in) :: slopes
+      integer, intent(in) :: w, kind
+      real(wp), intent(inout) :: change(:, :)    !! (3 n_vertex, 3 n_vertex)
+      real(wp) :: mean(at_eta)                   ! slope
+      integer :: a, b, i, l
+
+      mean = 0.5_wp*(formed%slope(:, kind, 0) + formed%slope(:, kind, 1))
+      do l = 1, 3
+         do b = 1, 3
+            do i = 1, 3
+               associate (row => 3*(vertex(i) - 1), column => 3*(vertex(l) - 1) + b, &
+                     part => slopes%part(i, b, l, w))
+                  do a = 1, at_eta
+                     change(row + a, column) = change(row + a, column) - mean(a)*part &
+                        - formed%part(i, w)*slopes%slope(a, b, l, kind)
+                  end do
+                  if (kind == of_height) change(row + at_height, column) = &
+                     change(row + at_height, column) + chi(i)*part
+               end associate
+            end do
+         end do
+      end do
+   end subroutine add_change
+
+   !> Of the rest.
+   pure subroutine add_rest(chi, vertex, formed, slopes, w, kind, by_rest)
+      real(wp), intent(in) :: chi(3)             !! at the corners
+      integer, intent(in) :: vertex(3)           !! which they are
+      type(formed_t), intent(in) :: formed
+      type(field_slopes_t), intent(in) :: slopes
+      integer, intent(in) :: w, kind
+      real(wp), intent(inout) :: by_rest(:)      !! (3 n_vertex)
+      real(wp) :: mean(3)                        ! value
+      integer :: a, l
+
+      mean = 0.5_wp*(formed%value(:, kind, 0) + formed%value(:, kind, 1))
+      do l = 1, 3
+         associate (to => by_rest(3*vertex(l) - 2:3*vertex(l)), rest => slopes%rest(l, w))
+            do a = 1, at_eta
+               to(a) = to(a) + dot_product(mean, slopes%moment(:, a, l, w)) &
+                  - rest*formed%slope(a, kind, 1)
+            end do
+            if (kind == of_height) to(at_height) = to(at_height) + rest*chi(l)
          end associate
       end do
    end subroutine add_rest
 
-   !> a b^T.
-   pure function outer(a, b)
-      real(wp), intent(in) :: a(:), b(:)         !! any
-      real(wp) :: outer(size(a), size(b))
+   !> The ways of the vertices, each by what it has to do with the patch: docs/theory.md, eq. (48).
+   pure subroutine closing_begin(at, field, closing, covered)
+      type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
+      type(field_t), intent(in) :: field(:)      !! the triangles, placed
+      type(closing_t), intent(inout) :: closing
+      real(wp), intent(out) :: covered(:)        !! (n_vertex) by its triangles, at both ends
+      integer :: j, k
 
-      outer = spread(a, 2, size(b))*spread(b, 1, size(a))
-   end function outer
+      covered = 0.0_wp
+      do k = 1, size(field)
+         associate (v => field(k)%vertex)
+            covered(v) = covered(v) + sum(field(k)%moment)
+         end associate
+      end do
+      allocate(closing%weight(size(at)), closing%way(at_eta, size(at)))
+      ! By ways of round-off nothing is divided.
+      closing%square = rounding
+      do j = 1, size(at)
+         closing%weight(j) = covered(j)/(covered(j) + some)
+         closing%way(:, j) = at(j)%df(:at_eta)
+         closing%square = closing%square + closing%weight(j)*sum(closing%way(:, j)**2)
+      end do
+   end subroutine closing_begin
+
+   !> From slopes of what is covered to those of the weights, and of the square.
+   pure subroutine closing_change(covered, closing)
+      real(wp), intent(in) :: covered(:)         !! (n_vertex)
+      type(closing_t), intent(inout) :: closing
+      integer :: j
+
+      allocate(closing%by_square(size(closing%weight_slope, 1)), source=0.0_wp)
+      associate (by_square => closing%by_square, slope => closing%weight_slope)
+         do j = 1, size(covered)
+            slope(:, j) = some/(covered(j) + some)**2*slope(:, j)
+            by_square(3*j - 2:3*j - 1) = by_square(3*j - 2:3*j - 1) &
+               + 2.0_wp*closing%weight(j)*closing%way(:, j)
+            by_square = by_square + sum(closing%way(:, j)**2)*slope(:, j)
+         end do
+      end associate
+   end subroutine closing_change
+
+   !> The sum with the weights of `weight`, of heights from `target` or of 1.
+   pure subroutine sums_take(sums, weight, target, of_cover, leaves_second, share)
+      type(patch_sums_t), intent(in) :: sums
+      real(wp), intent(in) :: weight(:)          !! (>= n_weight)
+      real(wp), intent(in) :: target             !! [L]
+      logical, intent(in) :: of_cover            !! of 1: what is covered
+      logical, intent(in) :: leaves_second       !! no `change`
+      type(share_t), intent(out) :: share
+      real(wp) :: of_kind(of_height:of_one)      ! of each kind of field
+      real(wp) :: part(3, of_height:of_one)      ! of each sum
+      integer :: end, kind, w
+
+      of_kind = [1.0_wp, -target]
+      if (of_cover) of_kind = [0.0_wp, 1.0_wp]
+      part = 0.0_wp
+      do w = 1, sums%n_weight
+         part(w, :) = weight(w)*of_kind
+      end do
+      do end = 0, 1
+         share%f(end) = sum(part*sums%f(:, :, end))
+      end do
+      associate (n => size(sums%by, 2))
+         allocate(share%by(3, n), share%end_by(3, n), source=0.0_wp)
+         if (.not. leaves_second) allocate(share%change(3*n, 3*n), source=0.0_wp)
+      end associate
+      do kind = of_height, sums%n_kind
+         do w = 1, sums%n_weight
+            if (.not. abs(part(w, kind)) > 0.0_wp) cycle
+            share%by = share%by + part(w, kind)*sums%by(:, :, w, kind)
+            share%end_by = share%end_by + part(w, kind)*sums%end_by(:, :, w, kind)
+            if (.not. leaves_second) share%change = share%change &
+               + part(w, kind)*sums%change(:, :, w, kind)
+         end do
+      end do
+      call close_sum(sums, part, of_kind, share)
+   end subroutine sums_take
+
+   !> What the gradient lacks, put on the ways of the vertices.
+   pure subroutine close_sum(sums, part, of_kind, share)
+      type(patch_sums_t), intent(in) :: sums
+      real(wp), intent(in) :: part(:, :)         !! (3, 2) of each sum
+      real(wp), intent(in) :: of_kind(:)         !! (2) of each kind of field
+      type(share_t), intent(inout) :: share
+      real(wp) :: rest, size_of, ratio, factor
+      integer :: a, j, k
+
+      rest = sum(part*sums%rest)
+      size_of = tiny(size_of)
+      do k = 1, size(sums%total, 3)
+         size_of = max(size_of, maxval(abs(matmul(sums%total(:, :, k), of_kind))))
+      end do
+      ratio = (rest/(rounding*size_of))**2
+      ratio = merge(ratio/(1.0_wp + ratio), 1.0_wp, ratio <= huge(ratio))
+      factor = ratio*rest/sums%closing%square
+      associate (weight => sums%closing%weight, way => sums%closing%way)
+         do j = 1, size(weight)
+            do a = 1, at_eta
+               share%by(a, j) = share%by(a, j) + factor*weight(j)*way(a, j)
+            end do
+         end do
+      end associate
+      if (allocated(share%change)) call change_of_closing(sums, part, factor, &
+         ratio*(3.0_wp - 2.0_wp*ratio)/sums%closing%square, share%change)
+   end subroutine close_sum
+
+   !> Add how the closing term changes.
+   pure subroutine change_of_closing(sums, part, factor, by_rest, change)
+      type(patch_sums_t), intent(in) :: sums
+      real(wp), intent(in) :: part(:, :)         !! (3, 2) of each sum
+      real(wp), intent(in) :: factor             !! of weight times way [L]
+      real(wp), intent(in) :: by_rest            !! its slope by the rest
+      real(wp), intent(inout) :: change(:, :)    !! (3 n_vertex, 3 n_vertex)
+      real(wp) :: slope(size(change, 1))         ! of the factor
+      integer :: a, i, j, k, kind, w
+
+      slope = 0.0_wp
+      do kind = of_height, of_one
+         do w = 1, sums%n_weight
+            slope = slope + part(w, kind)*sums%by_rest(:, w, kind)
+         end do
+      end do
+      associate (closing => sums%closing)
+         slope = by_rest*slope - factor/closing%square*closing%by_square
+         do k = 1, size(change, 2)
+            do j = 1, size(closing%weight)
+               do a = 1, at_eta
+                  i = 3*(j - 1) + a
+                  change(i, k) = change(i, k) + closing%way(a, j)*(closing%weight(j)*slope(k) &
+                     + factor*closing%weight_slope(k, j))
+               end do
+            end do
+         end do
+         do j = 1, size(closing%weight)
+            do a = 1, at_eta
+               i = 3*(j - 1) + a
+               change(i, i) = change(i, i) + factor*closing%weight(j)
+            end do
+         end do
+      end associate
+   end subroutine change_of_closing
 
 end module emcon_patch_sum_space

@@ -1,7 +1,8 @@
 !> Leaves of the arithmetic in space: dot product, area, affine coordinates, height.
 module test_dgrad_space
    use check, only : check_near, test_case_t
-   use emcon_dgrad9, only : dg_affine, dg_area, dg_dot, dg_height, dg_t, difference, difference_t
+   use emcon_dgrad9, only : dg_affine, dg_area, dg_dot, dg_height, dg_plane, dg_t, difference, &
+      difference_t
    use emcon_dgrad_nodes, only : nodes_add_first
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -43,7 +44,7 @@ contains
       a = difference(2, 1, x0, dx)
       b = difference(3, 1, x0, dx)
       d = difference(4, 1, x0, dx)
-      call dg_affine(d, a, b, xi, eta)
+      call dg_affine(d, a, b, dg_plane(a, b), xi, eta)
       select case (which)
       case (1)
          leaf = dg_dot(d, difference(3, 2, x0, dx))

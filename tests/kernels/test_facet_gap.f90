@@ -47,7 +47,6 @@ contains
 
       call make_grid(patch, 1.0_wp, x)
       patch%area = patch_triangle()
-      patch%is_integral = .true.
       x(:, 1) = [0.1_wp, 0.2_wp, 0.0_wp]
       x(:, 2) = x(:, 1) + [2.1_wp, 0.3_wp, 0.0_wp]
       x(:, 3) = x(:, 1) + [-0.4_wp, 1.8_wp, 0.0_wp]
@@ -65,7 +64,7 @@ contains
       x = x + rough*(2.0_wp*noise - 1.0_wp)
       call draw_random(noise)
       call draw_random(draw)
-      patch%area%weight = dual + draw
+      patch%weight = dual + draw
       end = x + wobble*(2.0_wp*noise - 1.0_wp)
       call draw_random(draw)
       end(:2, :3) = end(:2, :3) + spread(slide*[cos(6.0_wp*draw(1)), sin(6.0_wp*draw(1))], 2, 3)
@@ -94,7 +93,7 @@ contains
             height(i) = 0.3_wp + 0.1_wp*corner(1) - 0.2_wp*corner(2)
          end do
       end associate
-      patch%area%weight = dual
+      patch%weight = dual
       call patch_gap(patch, x, 0.0_wp*x, 0.0_wp, .true., gap)
       call check_near(error, gap%f1, area/12.0_wp*(dot_product(dual, height) &
          + sum(dual)*sum(height)), tol, 1.0_wp, "the integral")
@@ -205,7 +204,6 @@ contains
       integer :: i, j, n
 
       patch%area = patch_triangle()
-      patch%is_integral = .true.
       patch%length = 1.0_wp
       allocate(x(3, 4 + n_ring*n_around), patch%triangle(3, n_around*(2*n_ring - 1)))
       x(:, 1) = [0.07_wp, -0.1_wp, 0.0_wp]
@@ -264,7 +262,7 @@ contains
             x = x + 0.05_wp*(dx - 0.5_wp)
             call draw_random(dx)
             dx = step*(dx - 0.5_wp)
-            patch%area%weight = merge(1.0_wp, 0.0_wp, [0, 1, 2] == mod(k, 3))
+            patch%weight = merge(1.0_wp, 0.0_wp, [0, 1, 2] == mod(k, 3))
             call patch_gap(patch, x, dx, 0.0_wp, .false., gap)
             call check_true(error, gap%n_vertex > 8, "it sees the ball")
             call check_true(error, maxval(abs(gap%h)) < 0.1_wp, "largest entry " // &
@@ -287,7 +285,7 @@ contains
       do i = 0, 4
          by = 8.0_wp*eps*1.0e3_wp**i
          call make_facet(patch, x)
-         patch%area%weight = dual
+         patch%weight = dual
          x(3, 4:) = [(rough*sin(real(i, wp)), i = 1, n_vertex)]
          associate (corner => x(:, 3 + patch%triangle(:, 2*n_side**2/2 + n_side)))
             x(:2, 1) = sum(corner(:2, :), 2)/3.0_wp
