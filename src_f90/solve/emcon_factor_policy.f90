@@ -12,7 +12,7 @@ module emcon_factor_policy
    use emcon_evaluation, only : instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_is_straight, kept_factor_look, &
+      kept_factor_is_possible, kept_factor_look, &
       kept_factor_multipliers, kept_factor_reach, &
       kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
@@ -33,9 +33,6 @@ module emcon_factor_policy
    !> Solves of a step that it may fail: of a set that is not the last one, more often than not.
    integer, parameter :: most_failures = 2
 
-   !> Looks at the second derivatives of constraints in a solve.
-   integer, parameter :: most_looks = 2
-
    type :: factor_policy_t
       logical :: is_wanted = .true.              !! in steps that it may serve
       logical :: is_allowed = .false.            !! in the present step
@@ -44,7 +41,8 @@ module emcon_factor_policy
       logical, private :: is_new = .false.       !! made in it
       integer, private :: n_failure = 0          !! solves of the present step that it has failed
       logical, private :: knows_set = .false.    !! it has taken the solve's constraints
-      integer, private :: n_look = 0             !! looks at their second derivatives since then
+      logical, private :: is_on_its_way = .false.    !! the solve has made a correction
+      logical, private :: has_looked = .false.   !! at their second derivatives since then
       type(instant_t), private :: start          !! of the present step
       real(wp), private :: h = 0.0_wp            !! and its size [T]
       integer, private :: increment = 0          !! increments done before it
@@ -122,17 +120,18 @@ contains
       end if
       if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown), self%made(n_unknown))
       self%knows_set = .false.
-      self%n_look = 0
+      self%is_on_its_way = .false.
+      self%has_looked = .false.
       call mixing_begin(self%mixing, n_unknown)
    end subroutine factor_policy_begin
 
-   !> Are second derivatives of the constraints to be looked at? They are as a solve begins and,
-   !> unless they say next to nothing then, after its first correction, which takes it most of the
-   !> way.
+   !> Are second derivatives of the constraints to be looked at? They are after the first
+   !> correction, which takes the solve most of its way: multipliers before it are those of a guess,
+   !> and tell nothing where they are another set's.
    pure logical function factor_policy_looks(self)
       type(factor_policy_t), intent(in) :: self
 
-      factor_policy_looks = self%n_look < most_looks
+      factor_policy_looks = self%is_on_its_way .and. .not. self%has_looked
    end function factor_policy_looks
 
    !> Let there be a factor, of the present tangent if it is a new one, that knows the constraints.
@@ -158,8 +157,7 @@ contains
       if (.not. is_fit) return
       if (factor_policy_looks(self)) then
          call kept_factor_look(correction%kept, set, system%space%numbering)
-         self%n_look = self%n_look + 1
-         if (kept_factor_is_straight(correction%kept, set)) self%n_look = most_looks
+         self%has_looked = .true.
       end if
    end subroutine factor_policy_make
 
@@ -195,7 +193,7 @@ contains
 
       call factor_policy_forget(self, correction)
       self%knows_set = .false.
-      self%n_look = 0
+      self%has_looked = .false.
       call mixing_begin(self%mixing, size(self%proposed))
    end subroutine factor_policy_renew
 
@@ -210,6 +208,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       self%n_correction = self%n_correction + 1
+      self%is_on_its_way = .true.
       call kept_factor_correct(correction%kept, set, residual, self%proposed(:size(dq)), error)
       if (allocated(error)) return
       if (set%penalty%is_under_way) then

@@ -27,17 +27,14 @@ module emcon_kept_factor
    implicit none
    private
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
-      kept_factor_let_iterate, kept_factor_look, kept_factor_is_straight, kept_factor_serves, &
-      kept_factor_correct, kept_factor_forget, &
-      kept_factor_free, kept_factor_is_possible, kept_factor_has_room, kept_factor_multipliers, &
-      kept_factor_reach, kept_factor_condense, kept_factor_may_condense, kept_factor_settle, &
-      kept_factor_move
+      kept_factor_let_iterate, kept_factor_look, kept_factor_serves, kept_factor_correct, &
+      kept_factor_forget, kept_factor_free, kept_factor_is_possible, kept_factor_has_room, &
+      kept_factor_multipliers, kept_factor_reach, kept_factor_condense, &
+      kept_factor_may_condense, kept_factor_settle, kept_factor_move
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
    real(dp), parameter :: most_curved = 0.5_dp
-   !> Where it is this part of that, it is not looked at again.
-   real(dp), parameter :: little_curved = most_curved/16.0_dp
    !> Multipliers of a first guess may be several times too large.
    real(dp), parameter :: most_curved_far = 4.0_dp*most_curved
    !> A contact that gives way is that much softer or stiffer than what it pushes at, at most.
@@ -319,6 +316,7 @@ contains
          if (size(self%mu) /= set%n_row) deallocate(self%mu, self%bend)
       end if
       if (.not. allocated(self%mu)) allocate(self%mu(set%n_row), self%bend(set%n_row))
+      self%bend = 0.0_dp
       self%n_forward = self%n_forward + set%n_row
       if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
          call blocks_reach_rows(self%blocks, set%gap_rows, set%n_row, self%rows%panel, error)
@@ -437,21 +435,6 @@ contains
          if (abs(lam)*self%bend(k) > most) kept_factor_serves = .false.
       end do
    end function kept_factor_serves
-
-   !> Is that curvature so small, by multipliers that are known, that it stays so on the way?
-   pure logical function kept_factor_is_straight(self, set)
-      type(kept_factor_t), intent(in) :: self
-      type(constraint_set_t), intent(in) :: set
-      integer :: k
-
-      kept_factor_is_straight = .not. set%penalty%is_on
-      do k = set%n_linear + 1, set%n
-         associate (lam => abs(real(set%lam(k), dp)))
-            if (.not. (lam > 0.0_dp .and. lam*self%bend(k) <= little_curved)) &
-               kept_factor_is_straight = .false.
-         end associate
-      end do
-   end function kept_factor_is_straight
 
    !> The correction for `residual` (with contact forces) and the defects of the constraints last
    !> taken.

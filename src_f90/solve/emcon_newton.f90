@@ -203,9 +203,8 @@ contains
       call phase_enter(system%phases, phase_factorise, left)
       call factor_policy_make(self%factor_policy, self%correction, system, set, motion, is_fit, &
          error)
-      ! Multipliers of a first guess tell nothing: those of another set may be of any size.
-      if (is_fit .and. self%n_solve > 0 .and. .not. set%penalty%is_on) is_fit = &
-         kept_factor_serves(self%correction%kept, set, self%convergence%knows_sizes)
+      if (is_fit .and. .not. set%penalty%is_on) is_fit = kept_factor_serves( &
+         self%correction%kept, set, self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
    end subroutine make_factor
 
