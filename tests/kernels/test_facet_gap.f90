@@ -33,6 +33,7 @@ contains
          test_case_t("over a plane: integrals of products", test_plane), &
          test_case_t("a triangle half over the end sees half of it", test_cover), &
          test_case_t("identity for steps of any size", test_identity), &
+         test_case_t("a target that heights are all at: no force but the weights'", test_target), &
          test_case_t("momenta", test_momenta), &
          test_case_t("derivatives against differences", test_derivatives), &
          test_case_t("the tangent does not grow where a silhouette is inside", test_silhouette), &
@@ -152,6 +153,34 @@ contains
          end do
       end do
    end subroutine test_identity
+
+   !> Heights and target round, each of them: what is left of their difference closes nothing.
+   subroutine test_target(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: slide(4) = [1.0e-2_wp, 1.0e-5_wp, 1.0e-8_wp, 1.0e-12_wp]
+      real(wp), parameter :: target = 1.7_wp
+      type(patch_t) :: patch
+      type(patch_gap_t) :: gap, near
+      real(wp) :: x(3, n_point), far(3, n_point), dx(3, n_point), draw(3), turn(3, 3)
+      integer :: i, k
+
+      do i = 1, size(slide)
+         do k = 1, 20
+            call make_facet(patch, x)
+            call draw_random(draw)
+            patch%weight = dual + draw
+            dx = 0.0_wp
+            dx(:2, 4:) = spread(slide(i)*[cos(6.0_wp*draw(1)), sin(6.0_wp*draw(1))], 2, n_vertex)
+            far = x
+            far(3, 4:) = target
+            turn = turned(draw(2), draw(3))
+            call patch_gap(patch, matmul(turn, x), matmul(turn, dx), 0.0_wp, .true., near)
+            call patch_gap(patch, matmul(turn, far), matmul(turn, dx), target, .true., gap)
+            call check_near(error, [gap%f0, gap%f1], [0.0_wp, 0.0_wp], tol, 10.0_wp, "values")
+            call check_near(error, gap%g(7:), near%g(7:), tol, 10.0_wp, "forces of the master")
+         end do
+      end do
+   end subroutine test_target
 
    subroutine test_momenta(error)
       type(error_t), allocatable, intent(out) :: error
