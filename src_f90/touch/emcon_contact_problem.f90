@@ -260,11 +260,26 @@ contains
                slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:, k, i) &
                   *(stiffness(i)*merge(loosely, proximal, self%n_slip > 1 &
                   .or. self%hold(k, i) > 0.0_wp) &
-                  *self%w(row + k, row + k) - 1.0_wp), dp)
+                  *give_of(self, i, k, stiffness(i)) - 1.0_wp), dp)
                slope(row + k, row + k) = slope(row + k, row + k) + 1.0_dp
             end do
          end associate
       end do
    end subroutine find_slope
+
+   !> What row `k` of contact `i` gives way by its own force [T^2/M]. A slip that no force changes,
+   !> as one across a plane of symmetry, is taken to give way as its contact: its force stays where
+   !> it was as long as it does not slip.
+   pure real(wp) function give_of(self, i, k, stiffness) result(give)
+      type(contact_problem_t), intent(in) :: self
+      integer, intent(in) :: i                       !! 1 to n
+      integer, intent(in) :: k                       !! 0, its gap; 1 to n_slip
+      real(wp), intent(in) :: stiffness              !! of the contact [M/T^2]
+
+      associate (row => (1 + self%n_slip)*(i - 1) + 1 + k)
+         give = self%w(row, row)
+      end associate
+      if (k > 0 .and. .not. abs(give) > 0.0_wp) give = 1.0_wp/stiffness
+   end function give_of
 
 end module emcon_contact_problem

@@ -159,6 +159,8 @@ contains
       a(:, most_slips + 1) = -self%free - [0.0_wp, end]
       do i = 1, self%n_slip
          a(i, i) = a(i, i) + k
+         ! What no force moves: 0 sticks there if it does not slip, and if it does it slides.
+         if (.not. abs(a(i, i)) > 0.0_wp) a(i, i) = epsilon(k)/self%stiffness
       end do
       do i = self%n_slip + 1, most_slips
          a(i, :) = 0.0_wp

@@ -66,7 +66,27 @@ contains
       call check_one(error, 0.5_wp, 0.75_wp, 0.5_wp, 0.0_wp, "free on the way")
       call check_one(error, -0.25_wp, 0.75_wp, 0.5_wp, -0.25_wp, "rests")
       call check_one(error, -2.0_wp, 0.75_wp, 0.5_wp, -0.5_wp, "slides from there")
+      call check_held(error)
    end subroutine test_by_hand
+
+   !> What no force moves along the surface: friction is 0, or against a slip that is given.
+   subroutine check_held(error)
+      type(error_t), allocatable, intent(inout) :: error
+      type(single_contact_t) :: place
+      real(wp), parameter :: slip(2) = [0.3_wp, 0.4_wp]
+      real(wp) :: force(0:most_slips)
+
+      place%n_slip = 2
+      place%w(0, 0) = 2.0_wp
+      place%mu = 0.5_wp
+      place%free(0) = -2.0_wp
+      force = single_contact_solve(place)
+      call check_near(error, force, [1.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "held, no slip")
+      place%free(1:) = -slip
+      force = single_contact_solve(place)
+      call check_near(error, force, [1.0_wp, 0.3_wp, 0.4_wp], 8.0_wp*epsilon(1.0_wp), 1.0_wp, &
+         "held, slips")
+   end subroutine check_held
 
    !> Slip `slip` without forces, that leads to `lead`, takes friction `tau`.
    subroutine check_one(error, slip, lead, mu, tau, name)
@@ -124,7 +144,7 @@ contains
       end do
    end subroutine test_one
 
-   !> A second slip that nothing moves changes nothing.
+   !> A second slip that moves nothing else changes nothing, and needs not even move by itself.
    subroutine test_plane_in_space(error)
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: plane, space
@@ -141,7 +161,7 @@ contains
          call contact_problem_create(space, 2, n)
          kept = [(3*(k - 1) + [1, 2], k = 1, n)]
          do k = 1, n
-            space%w(3*k, 3*k) = 1.0_wp
+            space%w(3*k, 3*k) = real(mod(i/2, 2), wp)
          end do
          space%w(kept, kept) = plane%w
          space%free(:1, :) = plane%free

@@ -581,6 +581,34 @@ def test_friction_keeps_a_plane_of_symmetry(tmp_path: Path, mu: float) -> None:
     assert np.abs(u - u[:, mirror]*[1, -1, 1]).max() <= 64*EPSILON
 
 
+def half_or_all(is_half: bool, card: str) -> tuple[Block, str]:
+    """A slab that is pressed on the floor and shifted along it, or what of it is on one side of its plane of symmetry."""
+    block = Block("C3D8", (4, 2 if is_half else 4, 2), size=(1, .5 if is_half else 1, .5),
+                  place=lambda x: x - np.array([.5, 0 if is_half else .5, 0]))
+    top = block.on(2, 1).tolist()
+    held = "".join(f"{k}, 2, 2\n" for k in sorted({*top, *(block.on(1, 0).tolist() if is_half else [])}))
+    text = (bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane()) + walls.pair("", card)
+            + f"*BOUNDARY\n{walls.FIXED}{held}*STEP, NLGEOM\n*STATIC\n.25, 1.\n*BOUNDARY\n")
+    return block, text + "".join(f"{k}, 1, 1, .01\n{k}, 3, 3, -.02\n" for k in top) + "*NODE FILE\nU\n*CONTACT FILE\nCF\n*END STEP\n"
+
+
+@pytest.mark.parametrize("card", ["*FRICTION\n.3\n", "*FRICTION\n1E-6\n", "*FRICTION, ROUGH\n"])
+def test_half_of_what_is_symmetric(tmp_path: Path, card: str) -> None:
+    """On the plane of symmetry no force moves a contact across it: it is solved as all of the body is."""
+    (half, a), (whole, b) = half_or_all(is_half=True, card=card), half_or_all(is_half=False, card=card)
+    for name in "ab":
+        (tmp_path/name).mkdir()
+    own, other = ran(tmp_path/"a", a), ran(tmp_path/"b", b)
+    place = [int(np.argmin(np.abs(whole.x - p).sum(1))) for p in half.x]
+    u = other.fields()["displacement"][-1][place]
+    # Of statics, which Newton's method leaves.
+    assert np.abs(own.fields()["displacement"][-1][:len(place)] - u).max() < 1e-9*np.abs(u).max()
+    force = own.fields()["contact_force"][-1][half.on(1, 0) - 1]
+    assert not force[:, 1].any()
+    assert own.verdict["newton"] <= other.verdict["newton"]
+    assert own.verdict["cuts"] == 0
+
+
 def inertia(block: Block) -> tuple[float, float]:
     """Mass of a block of C3D8 of density 1, and its moment about the axis z through its middle."""
     point, weight = np.polynomial.legendre.leggauss(4)
