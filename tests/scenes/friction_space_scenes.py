@@ -47,6 +47,8 @@ class Ball:
     width: float = 0.6                           # half of what is meshed, across
     height: float = 0.9
     kind: str = "C3D8"
+    is_half: bool = False                        # what is on one side of y = 0, where force and shift are along x
+    deep: float = 1.0                            # it is pressed by this and the square of the contact's radius under 1
 
     def contact_radius(self, push: float) -> float:
         """Hertz."""
@@ -86,14 +88,15 @@ class Ball:
         a = self.contact_radius(1.0)
         half, up = self.places(1.15*a, self.width), self.places(.5*a, self.height)
         across = np.concatenate([-half[:0:-1], half])
+        along_y = half if self.is_half else across
 
         def place(p: np.ndarray) -> np.ndarray:
-            i = np.rint(p*[len(across) - 1, len(across) - 1, len(up) - 1]).astype(int)
-            x, y = across[i[:, 0]], across[i[:, 1]]
+            i = np.rint(p*[len(across) - 1, len(along_y) - 1, len(up) - 1]).astype(int)
+            x, y = across[i[:, 0]], along_y[i[:, 1]]
             low = self.radius - np.sqrt(self.radius**2 - x*x - y*y)
             return np.stack([x, y, low + (1 - low/self.height)*up[i[:, 2]]], 1)
 
-        return Block(self.kind, (len(across) - 1, len(across) - 1, len(up) - 1), place=place)
+        return Block(self.kind, (len(across) - 1, len(along_y) - 1, len(up) - 1), place=place)
 
     def deck(self, block: Block, turn: float, increments: int) -> str:
         """Pressed in one increment, turned in `increments`."""
@@ -101,7 +104,7 @@ class Ball:
                            held=(1, 2))
 
     def pressed(self) -> str:
-        return f"3, 3, {self.contact_radius(1.0)**2/self.radius!r}"
+        return f"3, 3, {self.deep*self.contact_radius(1.0)**2/self.radius!r}"
 
     def deck_to_and_fro(self, block: Block, way: float) -> str:
         """Pressed without friction, then shifted along x, back, and again."""
@@ -117,6 +120,8 @@ class Ball:
         near = [(e, f) for e, f in faces(block, 2, 0) if np.linalg.norm(
             block.x[[k - 1 for k in block.element[e - 1] if k in low], :2].mean(0)) < 1.6*a]
         top = "".join(f"{k}, 1, 3\n" for k in block.on(2, 1))
+        if self.is_half:
+            top += "".join(f"{k}, 2, 2\n" for k in sorted(set(block.on(1, 0).tolist()) - set(block.on(2, 1).tolist())))
         text = bodies([block], [near], f"*ELASTIC\n{self.stiffness!r}, {self.nu!r}\n")
         text += walls.wall(walls.plane(), (0., 0., 0.)) + walls.pair(", SIDES=ONE", f"*FRICTION\n{self.mu!r}\n")
         text += f"*BOUNDARY\n{top}{walls.REFERENCE}, {held[0]}, {held[1]}\n{walls.REFERENCE}, 4, 5\n"
