@@ -183,13 +183,18 @@ class Cards:
         return self._card(card, {card: name}, [(item,) for item in names])
 
     def amplitude(self: _Cards, name: str, times: ArrayLike, values: ArrayLike, *,
-                  time: Literal["STEP TIME", "TOTAL TIME"] = "STEP TIME") -> _Cards:
-        """`*AMPLITUDE`: factors `values` (k,) at `times` (k,) [T], ascending; linear between."""
+                  time: Literal["STEP TIME", "TOTAL TIME"] = "STEP TIME",
+                  definition: Literal["TABULAR", "SMOOTH STEP"] = "TABULAR") -> _Cards:
+        """`*AMPLITUDE`: factors `values` (k,) at `times` (k,) [T], ascending.
+
+        definition   between the times: TABULAR, lines; SMOOTH STEP, curves whose slope and
+                     curvature are 0 at each of the times
+        """
         t, a = real(times, "times of an amplitude"), real(values, "values of an amplitude")
         if t.ndim != 1 or t.shape != a.shape or not len(t):
             raise InputError("times and values of an amplitude are arrays (k,) of one length, not "
                              f"{t.shape} and {a.shape}")
-        return self._card("AMPLITUDE", {"NAME": name, "DEFINITION": "TABULAR", "TIME": time},
+        return self._card("AMPLITUDE", {"NAME": name, "DEFINITION": definition, "TIME": time},
                           data=table(t, a))
 
     def time_points(self: _Cards, name: str, times: ArrayLike | None = None, *,
