@@ -328,15 +328,18 @@ class Model(Source):
         return self._card("ORIENTATION", {"NAME": name, "SYSTEM": "RECTANGULAR"}, [(*a, *b)])
 
     def rigid_body(self, elements: str | None, reference: int | str, *,
-                   profile: str | None = None) -> Model:
-        """`*RIGID BODY`: an element set that keeps its shape, a profile, or both.
+                   nodes: str | None = None, profile: str | None = None) -> Model:
+        """`*RIGID BODY`: an element set that keeps its shape, a set of nodes, a profile, or some of these.
 
-        reference   node, or set of one, that is prescribed, loaded and started: 1, 2 and 6
-        profile     surface of segments; without elements it is prescribed in every step
+        reference   node, or set of one, that is prescribed, loaded and started: in the plane degrees
+                    of freedom 1, 2 and 6, in three dimensions 1 to 6
+        nodes       node set that moves as a rigid body, with the elements that have no other nodes;
+                    the nodes of a face of an elastic body are a rigid end
+        profile     surface of segments, or a wall; without elements it is prescribed in every step
         """
         (name,) = self._names(reference, self._nodes, "*RIGID BODY")
-        return self._card("RIGID BODY", {"ELSET": elements, "ANALYTICAL SURFACE": profile,
-                                         "REF NODE": name})
+        return self._card("RIGID BODY", {"ELSET": elements, "NSET": nodes,
+                                         "ANALYTICAL SURFACE": profile, "REF NODE": name})
 
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:

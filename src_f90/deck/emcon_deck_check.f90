@@ -124,6 +124,7 @@ contains
          is_bare(scene%rigid(i)%node) = .false.
          if (allocated(scene%rigid(i)%arm)) is_bare(scene%rigid(i)%arm) = .false.
       end do
+      is_bare(pack(scene%rigid%turning, scene%rigid%turning > 0)) = .false.
       call profile_facets(scene, profile)
       is_bare([profile]) = .false.
       is_bare(pack(scene%surface%inner_node, scene%surface%inner_node > 0)) = .false.

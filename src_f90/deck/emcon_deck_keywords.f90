@@ -69,7 +69,7 @@ module emcon_deck_keywords
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
          // "ORIENTATION=,!OFFSET:0,~CONTROLS"), &
       keyword_t("ORIENTATION", in_model, "NAME=,SYSTEM=,~DEFINITION:COORDINATES"), &
-      keyword_t("RIGID BODY", in_model, "ELSET=,ANALYTICALSURFACE=,REFNODE=,!NSET,!ROTNODE," &
+      keyword_t("RIGID BODY", in_model, "ELSET=,NSET=,ANALYTICALSURFACE=,REFNODE=,ROTNODE=," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
@@ -160,7 +160,7 @@ module emcon_deck_keywords
    type(refusal_t), parameter :: refusals(*) = [ &
       refusal_t("write what it couples as *EQUATION; what moves as a whole is a *RIGID BODY", &
          "MPC"), &
-      refusal_t("make the coupled part a *RIGID BODY, or couple its nodes by *EQUATION", &
+      refusal_t("make the coupled nodes a *RIGID BODY by NSET=, or write *EQUATION", &
          "COUPLING,KINEMATIC"), &
       refusal_t("spread the force over the nodes by *CLOAD, over faces by *DSLOAD", &
          "DISTRIBUTING"), &
@@ -346,10 +346,8 @@ contains
          call law_titles("HYPERELASTIC", reason)
          reason = " (laws are " // reason // ")"
       case ("ANALYTICALSURFACE", "NSET", "PINNSET", "TIENSET")
-         if (mark == mark_unsupported) reason = " (a rigid body is made of elements: ELSET=)"
+         if (mark == mark_unsupported) reason = " (its nodes are NSET=, its elements ELSET=)"
          if (mark == mark_without_effect) reason = " (it does not narrow what is written)"
-      case ("ROTNODE")
-         reason = " (degree of freedom 6 of the reference node is the rotation)"
       case ("READ")
          reason = " (use: emcon restart NAME.rst.h5)"
       case ("INSTANCE")

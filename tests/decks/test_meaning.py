@@ -529,7 +529,7 @@ TIP, WALL
 
 @pytest.mark.parametrize(("card", "told"), [
     ("*MPC\nBEAM, 1, 2\n", "write what it couples as *EQUATION; what moves as a whole is a *RIGID BODY"),
-    ("*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=S\n", "make the coupled part a *RIGID BODY"),
+    ("*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=S\n", "make the coupled nodes a *RIGID BODY"),
     ("*DISTRIBUTING\n1, 3\n", "spread the force over the nodes by *CLOAD"),
     ("*EMBEDDED ELEMENT\nE\n", "join their surfaces by *TIE"),
     ("*SPRING, ELSET=E\n", "use a strip of soft solid elements"),
