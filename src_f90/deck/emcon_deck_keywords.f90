@@ -107,6 +107,7 @@ module emcon_deck_keywords
       keyword_t("CHANGE FRICTION", in_step, "INTERACTION=,RESET,!AMPLITUDE,!ELEMENTSET," &
          // "!NODESET", has_data=.false.), &
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,~MASTER,~SLAVE," &
+         // "~ABSOLUTEPENETRATIONTOLERANCE,~RELATIVEPENETRATIONTOLERANCE," &
          // "!AUTOMATICTOLERANCES,!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MAXCHP,!PERRMX,!UERRMX," &
          // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
       keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,TIMEDELAY=,!LOADCASE:1," &
@@ -324,6 +325,12 @@ contains
       case ("ALPHA")
          reason = " (the energy-momentum scheme has no numerical damping: *TIME INTEGRATION, " &
             // "SCHEME=GENERALIZED ALPHA has)"
+      case ("ABSOLUTEPENETRATIONTOLERANCE", "RELATIVEPENETRATIONTOLERANCE")
+         reason = " (contact is held exactly)"
+      case ("SLIPTOLERANCE", "ELASTICSLIP")
+         reason = " (what sticks does not move)"
+      case ("MASTER", "SLAVE")
+         reason = " (the card is about all pairs)"
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
       case ("NOSEPARATION")
