@@ -20,7 +20,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 #: What a line of commands begins with.
 FIRST = r"(?:\$ )?(?:sudo )?(make|pip|valgrind|emcon|\S*python3?|build/\S+)\s"
 #: Decks that an earlier line of a page makes, or that stand for a reader's own.
-OWN_DECKS = {"big.inp", "full.inp", "pile.inp", "strips.inp", "ring.inp", "ball.inp", "bar.inp"}
+OWN_DECKS = {"big.inp", "fold.inp", "full.inp", "pile.inp", "strips.inp", "ring.inp", "ball.inp", "bar.inp"}
 #: Words that stand for what a reader has.
 OWN = {"PYTHON", "DIR", "BEFORE"}
 

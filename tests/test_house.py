@@ -61,6 +61,7 @@ COMMENT = re.compile(r"!.*")
 STOP = re.compile(r"(?:^|[;)])\s*(?:(?:error\s+)?stop\b(?!\s*[=(%])|call\s+(?:exit|abort)\b)", re.I)
 PRINT = re.compile(r"(?:^|[;)])\s*(?:print\s*[*\"'(]|write\s*\(\s*\*)", re.I)
 
+PLACED = {"contact", "touch", "solve", "active", "march"}
 CITED = re.compile(r"(\S+\s)?\beqs?\. ((?:\(\w+\)(?:, | and | to )?)+)")
 
 _spec = importlib.util.spec_from_file_location("module_order", ROOT / "src_f90/module_order.py")
@@ -338,8 +339,17 @@ def theory_numbers(root):
                 yield f"{path.relative_to(root)}: section {number} is not in docs/theory.md"
 
 
+def theory_places(root):
+    """Modules of contact and of the march that docs/theory.md does not name."""
+    theory = set(re.findall(r"\w+", (root / "docs/theory.md").read_text()))
+    for path in sources(root):
+        if room(root, path) in PLACED and path.suffix != ".inc" and path.stem not in theory:
+            yield f"docs/theory.md does not name {path.stem}"
+
+
 CHECKS = {
     "theory": theory_numbers,
+    "theory places": theory_places,
     "names": names,
     "arrows up": arrows_up,
     "cycles": cycles,
@@ -508,6 +518,7 @@ BAD = {
         "base/emcon_a.f90": "module emcon_a\n   type, public :: a_t\n" + "      real :: a(2), b = f(1, 2)\n"*10
         + "      type(a_t), pointer :: next => null()\n   end type a_t\nend module\n"
     },
+    "theory places": {"solve/emcon_a.f90": "module emcon_a\nend module emcon_a\n"},
     "theory, twice": {"../docs/theory.md": "## 4 X\n$$x \\tag{1}$$\n$$y \\tag{1}$$\n"},
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"stepper/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},

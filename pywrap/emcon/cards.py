@@ -23,7 +23,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f\ud800-\udfff]")
 Number: TypeAlias = float | str
 #: Nodes or elements: the name of a set, a number, or several of them.
 Where: TypeAlias = str | int | Sequence[str | int] | NDArray[np.integer[Any]]
-Dof: TypeAlias = Literal[1, 2, 3, 6] | tuple[Literal[1, 2, 3, 6], ...]
+Dof: TypeAlias = Literal[1, 2, 3, 4, 5, 6] | tuple[Literal[1, 2, 3, 4, 5, 6], ...]
 Numbers: TypeAlias = NDArray[np.int64]
 _Cards = TypeVar("_Cards", bound="Cards")
 
@@ -105,8 +105,9 @@ class Cards:
         """Data lines `node, dof, value` (`twice`: `node, dof, dof, value`)."""
         what = f"*{keyword}"
         axes = np.atleast_1d(whole(dof, f"degree of freedom of {what}", (None,)*np.ndim(dof)))
-        if axes.ndim != 1 or not np.isin(axes, (1, 2, 3, 6)).all() or not len(axes):
-            raise InputError(f"{what}: a degree of freedom is 1, 2 or 3, or 6, the "
+        turns = (6,) if self._nodes.n_dim == 2 else (4, 5, 6)
+        if axes.ndim != 1 or not np.isin(axes, (1, 2, 3, *turns)).all() or not len(axes):
+            raise InputError(f"{what}: a degree of freedom is 1, 2 or 3, or {', '.join(map(str, turns))}, the "
                              f"rotation of the reference node of a rigid body, not {dof!r}")
         names = self._names(where, self._nodes, what)
         if isinstance(value, str):
@@ -183,13 +184,18 @@ class Cards:
         return self._card(card, {card: name}, [(item,) for item in names])
 
     def amplitude(self: _Cards, name: str, times: ArrayLike, values: ArrayLike, *,
-                  time: Literal["STEP TIME", "TOTAL TIME"] = "STEP TIME") -> _Cards:
-        """`*AMPLITUDE`: factors `values` (k,) at `times` (k,) [T], ascending; linear between."""
+                  time: Literal["STEP TIME", "TOTAL TIME"] = "STEP TIME",
+                  definition: Literal["TABULAR", "SMOOTH STEP"] = "TABULAR") -> _Cards:
+        """`*AMPLITUDE`: factors `values` (k,) at `times` (k,) [T], ascending.
+
+        definition   between the times: TABULAR, lines; SMOOTH STEP, curves whose slope and
+                     curvature are 0 at each of the times
+        """
         t, a = real(times, "times of an amplitude"), real(values, "values of an amplitude")
         if t.ndim != 1 or t.shape != a.shape or not len(t):
             raise InputError("times and values of an amplitude are arrays (k,) of one length, not "
                              f"{t.shape} and {a.shape}")
-        return self._card("AMPLITUDE", {"NAME": name, "DEFINITION": "TABULAR", "TIME": time},
+        return self._card("AMPLITUDE", {"NAME": name, "DEFINITION": definition, "TIME": time},
                           data=table(t, a))
 
     def time_points(self: _Cards, name: str, times: ArrayLike | None = None, *,
@@ -215,8 +221,9 @@ class Cards:
                  op: Literal["MOD", "NEW"] | None = None) -> _Cards:
         """`*BOUNDARY`: prescribe displacements [L]; before the first step as in it.
 
-        dof        1, 2, 3 or some of them; 6: rotation of the reference node of a rigid body,
-                   radians; default all displacements: (1, 2), in three dimensions (1, 2, 3)
+        dof        1, 2, 3 or some of them; of the reference node of a rigid body 6, in three
+                   dimensions 4, 5 and 6 too: rotations, radians; default all displacements:
+                   (1, 2), in three dimensions (1, 2, 3)
         value      one for all, (n_dof,), or (k, n_dof) for k nodes
         delay      how much later the amplitude begins [T]
         fixed      hold the degrees of freedom where the step finds them

@@ -328,37 +328,51 @@ class Model(Source):
         return self._card("ORIENTATION", {"NAME": name, "SYSTEM": "RECTANGULAR"}, [(*a, *b)])
 
     def rigid_body(self, elements: str | None, reference: int | str, *,
-                   profile: str | None = None) -> Model:
-        """`*RIGID BODY`: an element set that keeps its shape, a profile, or both.
+                   nodes: str | None = None, profile: str | None = None) -> Model:
+        """`*RIGID BODY`: an element set that keeps its shape, a set of nodes, a profile, or some of these.
 
-        reference   node, or set of one, that is prescribed, loaded and started: 1, 2 and 6
-        profile     surface of segments; without elements it is prescribed in every step
+        reference   node, or set of one, that is prescribed, loaded and started: in the plane degrees
+                    of freedom 1, 2 and 6, in three dimensions 1 to 6
+        nodes       node set that moves as a rigid body, with the elements that have no other nodes;
+                    the nodes of a face of an elastic body are a rigid end
+        profile     surface of segments, or a wall; without elements it is prescribed in every step
         """
         (name,) = self._names(reference, self._nodes, "*RIGID BODY")
-        return self._card("RIGID BODY", {"ELSET": elements, "ANALYTICAL SURFACE": profile,
-                                         "REF NODE": name})
+        return self._card("RIGID BODY", {"ELSET": elements, "NSET": nodes,
+                                         "ANALYTICAL SURFACE": profile, "REF NODE": name})
 
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:
         """`*INITIAL CONDITIONS`: velocities [L/T] or displacements [L] at the start.
 
-        dof     1, 2, 3 or some of them; 6: spin of the reference node of a rigid body [1/T]
+        dof     1, 2, 3 or some of them; of the reference node of a rigid body 6, in three
+                dimensions 4, 5 and 6 too: spins [1/T]
         value   one for all, (n_dof,), or (k, n_dof) for k nodes
         """
         self._valued("INITIAL CONDITIONS", where, dof, value, {"TYPE": type})
         return self
 
-    def rotating(self, where: Where, spin: Number, *, velocity: tuple[Number, Number] = (0.0, 0.0),
-                 about: tuple[Number, Number] = (0.0, 0.0)) -> Model:
-        """`*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY`: a spin about a point that moves.
+    def rotating(self, where: Where, spin: Number, *, velocity: Sequence[Number] | None = None,
+                 about: Sequence[Number] | Sequence[Sequence[Number]] | None = None) -> Model:
+        """`*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY`: a spin about an axis that moves.
 
-        spin       > 0 turns left [1/T]
-        velocity   of the point [L/T]
-        about      where the point is at the start [L]
+        spin       > 0 turns left; in three dimensions seen from the second point of the axis [1/T]
+        velocity   (n_dim,) of the axis [L/T]; default 0
+        about      (2,) where the axis is at the start; in three dimensions (2, 3) two of its points
+                   [L]; default the origin, and the axis z
         """
+        n_dim = self._nodes.n_dim
+        if about is None:
+            about = (0.0, 0.0) if n_dim == 2 else ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        axis = [x for point in about for x in
+                ((point,) if isinstance(point, (int, float, str)) else point)]
+        if len(axis) != (2 if n_dim == 2 else 6):
+            raise InputError("the axis of a spin is given by one point (2,)" if n_dim == 2 else
+                             "the axis of a spin is given by two points (2, 3)")
+        moves = (0.0,)*n_dim if velocity is None else velocity
         return self._card("INITIAL CONDITIONS", {"TYPE": "ROTATING VELOCITY"},
                           [row for name in self._names(where, self._nodes, "*INITIAL CONDITIONS")
-                           for row in ((name, spin, *velocity), about)])
+                           for row in ((name, spin, *moves), axis)])
 
     # --- contact, ties, equations ----------------------------------------------------------
 

@@ -43,7 +43,8 @@ class Step(Cards):
         """`*CLOAD`: forces on nodes [M L/T^2].
 
         where   node set, node, or (k,) of them
-        dof     1, 2, 3 or some of them; 6: moment on the reference node of a rigid body [M L^2/T^2]
+        dof     1, 2, 3 or some of them; in the plane 6: moment on the reference node of a rigid
+                body [M L^2/T^2]
         force   one for all, (n_dof,), or (k, n_dof)
         delay   how much later the amplitude begins [T]
         op      NEW: all forces of earlier steps go

@@ -16,6 +16,8 @@ typedef struct {
    double *zero;                  /* n zeros between calls */
    int (*levels)(void);           /* of OpenMP, where CHOLMOD uses it */
    void (*set_levels)(int);
+   int (*threads)(void);          /* and of the thread that calls */
+   void (*set_threads)(int);
 } emcon_cholmod_t;
 
 /* View of a full symmetric matrix: CSR is CSC here; CHOLMOD reads the lower triangle only. */
@@ -49,18 +51,29 @@ void *emcon_cholmod_new(int halves)
    if (halves) h->c.supernodal = CHOLMOD_SIMPLICIAL;
    *(void **)(&h->levels) = dlsym(RTLD_DEFAULT, "omp_get_max_active_levels");
    *(void **)(&h->set_levels) = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels");
+   *(void **)(&h->threads) = dlsym(RTLD_DEFAULT, "omp_get_max_threads");
+   *(void **)(&h->set_threads) = dlsym(RTLD_DEFAULT, "omp_set_num_threads");
    return h;
 }
 
 /* Factorise on this thread alone. Fronts here are small: the four threads that CHOLMOD would start,
-   whatever the environment says, wait for each other most of the time. */
+   whatever the environment says, wait for each other most of the time. OpenBLAS, which asks OpenMP
+   how many threads there are and waits until so many have come, must then be told one: with no
+   level of threads it would wait for ever. Both settings are those of the calling thread. */
 static void factorise(emcon_cholmod_t *h, cholmod_sparse *a, cholmod_factor *l)
 {
-   const int can_set = h->levels != NULL && h->set_levels != NULL;
-   const int levels = can_set ? h->levels() : 0;
-   if (can_set) h->set_levels(0);
+   const int can_set = h->levels != NULL && h->set_levels != NULL && h->threads != NULL
+      && h->set_threads != NULL;
+   const int levels = can_set ? h->levels() : 0, threads = can_set ? h->threads() : 0;
+   if (can_set) {
+      h->set_levels(0);
+      h->set_threads(1);
+   }
    cholmod_factorize(a, l, &h->c);
-   if (can_set) h->set_levels(levels);
+   if (can_set) {
+      h->set_threads(threads);
+      h->set_levels(levels);
+   }
 }
 
 int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)

@@ -5,7 +5,7 @@ module emcon_condition_nodes
    implicit none
    private
    public :: condition_resize, condition_resize_slip, condition_include, condition_fold, &
-      nodes_append
+      condition_take_slip, nodes_append
 
 contains
 
@@ -48,10 +48,38 @@ contains
       associate (m => old%n_node)
          self%g(:, :m) = old%g(:, :m)
          self%c(:, :m) = old%c(:, :m)
-         if (self%leaves_second) return
-         self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
+         if (.not. self%leaves_second) self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
+         if (.not. self%has_friction .or. .not. allocated(old%t)) return
+         if (size(old%t, 2) < m) return          ! of another evaluation: slip is not known yet
+         call condition_resize_slip(self)
+         self%slip = old%slip
+         self%t(:, :m, :) = old%t(:, :m, :)
+         self%t1(:, :m, :) = old%t1(:, :m, :)
+         if (.not. self%leaves_second) self%ht(:n_dim*m, :n_dim*m, :) = &
+            old%ht(:n_dim*m, :n_dim*m, :)
       end associate
    end subroutine condition_include
+
+   !> The slip of a condition over one motion, and its gradient at the end, for the same one over
+   !> another: what gaps depend on differs from motion to motion, and so do their nodes.
+   pure subroutine condition_take_slip(self, over)
+      type(condition_t), intent(inout) :: self   !! with friction
+      type(condition_t), intent(in) :: over      !! whose slip it is
+      logical :: is_missing(over%n_node)
+      integer :: place(over%n_node), j
+
+      do j = 1, over%n_node
+         is_missing(j) = any(abs(over%t1(:, j, :)) > 0.0_wp) .and. &
+            .not. any(self%node(:self%n_node) == over%node(j))
+      end do
+      call condition_include(self, pack(over%node(:over%n_node), is_missing))
+      place = [(findloc(self%node(:self%n_node), over%node(j), 1), j = 1, over%n_node)]
+      self%slip = over%slip
+      self%t1 = 0.0_wp
+      do j = 1, over%n_node
+         if (place(j) > 0) self%t1(:, place(j), :) = self%t1(:, place(j), :) + over%t1(:, j, :)
+      end do
+   end subroutine condition_take_slip
 
    !> Let a condition depend on nodes alone in the place of nodes and images of them in planes of
    !> symmetry, which move as they do but against the axis of each plane.
@@ -139,7 +167,8 @@ contains
       type(condition_t), intent(inout) :: self   !! resized
 
       if (allocated(self%t)) then
-         if (size(self%t, 2) /= size(self%g, 2)) deallocate(self%t, self%t1, self%ht)
+         if (any([size(self%t, 2), size(self%t1, 2)] /= size(self%g, 2)) .or. &
+            size(self%ht, 1) /= size(self%h, 1)) deallocate(self%t, self%t1, self%ht)
       end if
       associate (n_dim => size(self%g, 1), n => size(self%g, 2), m => size(self%h, 1))
          if (.not. allocated(self%t)) allocate(self%t(n_dim, n, n_dim - 1), &

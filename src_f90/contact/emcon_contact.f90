@@ -3,6 +3,7 @@
 !> A formulation chooses, once per step, what each constraint is made of (its stencil), and gives
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
+   use emcon_condition_nodes, only : condition_take_slip
    use emcon_constraint, only : condition_normal, condition_t, constraint_t
    use emcon_contact_law, only : contact_laws_t
    use emcon_evaluation, only : evaluation_is_at_start, evaluation_is_equilibrium
@@ -453,8 +454,7 @@ contains
          if (.not. item(k)%has_friction) cycle
          if (.not. item(k)%leaves_second) item(k)%ht = motion%weight*item(k)%ht
          ! Slip is over the step, wherever it pushes.
-         item(k)%slip = over(k)%slip
-         item(k)%t1 = over(k)%t1
+         call condition_take_slip(item(k), over(k))
       end do
       call find_normals(item)
       if (evaluation_is_equilibrium(motion%evaluation)) return

@@ -27,9 +27,8 @@ contains
       is_bare = scene%element%section == 0
       if (any(is_bare)) then
          i = findloc(is_bare, .true., 1)
-         call add_error(reader%log, scene%element%origin(i), "element " &
-            // label_list(pack(scene%element%label, is_bare)) &
-            // " has no section; give one by *SOLID SECTION")
+         call add_error(reader%log, scene%element%origin(i), "no *SOLID SECTION is " &
+            // "given for element " // label_list(pack(scene%element%label, is_bare)))
       end if
       allocate(is_used(size(scene%material)), has_weight(size(scene%material)), source=.false.)
       do i = 1, size(scene%section)
@@ -124,6 +123,7 @@ contains
          is_bare(scene%rigid(i)%node) = .false.
          if (allocated(scene%rigid(i)%arm)) is_bare(scene%rigid(i)%arm) = .false.
       end do
+      is_bare(pack(scene%rigid%turning, scene%rigid%turning > 0)) = .false.
       call profile_facets(scene, profile)
       is_bare([profile]) = .false.
       is_bare(pack(scene%surface%inner_node, scene%surface%inner_node > 0)) = .false.

@@ -108,7 +108,7 @@ contains
       if (reader%doubt%prescribed) return
       do i = 1, size(scene%rigid)
          associate (rigid => scene%rigid(i))
-            if (size(rigid%element) > 0) cycle
+            if (any([(any(scene%element%node == rigid%node(k)), k = 1, size(rigid%node))])) cycle
             do k = 1, size(scene%step)
                if (any(scene%step(k)%turn%rigid == i) .and. all([(prescribed_find( &
                   scene%step(k)%prescribed, rigid%reference, a), a = 1, scene%n_dim)] > 0)) cycle

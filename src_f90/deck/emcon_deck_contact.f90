@@ -171,8 +171,8 @@ contains
       formulation = option_default("formulation")
       if (option_name(card, "TYPE") == "") return
       if (option_name(card, "TYPE") == "SURFACETOSURFACE" .and. reader%n_dim == n_space) then
-         call card_warning(reader, card, "TYPE=SURFACE TO SURFACE is not for three dimensions in " &
-            // "this version: contact is by nodes, as under NODE TO SURFACE")
+         call card_warning(reader, card, "TYPE=SURFACE TO SURFACE is computed by nodes in three " &
+            // "dimensions, as NODE TO SURFACE; TYPE=MORTAR integrates over faces")
          return
       end if
       formulation = option_code("formulation", option_name(card, "TYPE"))

@@ -159,11 +159,13 @@ contains
 
       if (option_name(card, "STABILIZE") /= "") call card_warning(reader, card, "the value of " &
          // "STABILIZE has no effect: the motion is the smallest one, whatever the stiffness")
-      if (has_option(card, "STABILIZE") .eqv. has_option(card, "RESET")) call card_error(reader, &
-         card, "either STABILIZE or RESET is to be given")
+      if ((has_option(card, "STABILIZE") .and. has_option(card, "RESET")) .or. &
+         size(card%option) == 0) call card_error(reader, card, &
+         "either STABILIZE or RESET is to be given")
       if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
-      step%stabilizes = has_option(card, "STABILIZE")
+      if (has_option(card, "STABILIZE") .or. has_option(card, "RESET")) &
+         step%stabilizes = has_option(card, "STABILIZE")
    end subroutine read_controls
 
    !> Cards after `i_first` that the procedure of the step, or its duration, does not allow.

@@ -1,9 +1,9 @@
 !> *CONTACT, *CONTACT INCLUSIONS and *CONTACT PROPERTY ASSIGNMENT: all with all.
 !>
 !> What is included becomes pairs: a surface with itself, on one body or on many, or with another
-!> one; both sides are held, unless gaps are integrated. All exterior is one surface, of every free
-!> face, in contact with every analytical surface, too; faces that ties cover go out of it when the
-!> ties are known (`emcon_ties`).
+!> one; both sides are held, unless gaps are integrated. Pairs have the properties assigned to them.
+!> All exterior is one surface, of every free face, in contact with every analytical surface, too;
+!> faces that ties cover go out of it when the ties are known (`emcon_ties`).
 module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_contact, only : read_formulation
@@ -25,6 +25,8 @@ module emcon_deck_general_contact
    public :: read_general_contact
 
    character(len=*), parameter :: exterior_name = "ALL_EXTERIOR"
+   !> Fields of a line: a surface, the other one.
+   integer, parameter :: side_of_other = 2
 
 contains
 
@@ -43,14 +45,16 @@ contains
                if (i_contact == 0) i_contact = i
             case ("CONTACTINCLUSIONS", "CONTACTPROPERTYASSIGNMENT")
                if (i_contact == 0) call card_error(reader, card, "there is no *CONTACT before")
-               if (card%name == "CONTACTPROPERTYASSIGNMENT") then
-                  call check_properties(reader, card, scene)
-               else
+               if (card%name == "CONTACTINCLUSIONS") then
                   n = n + 1
                   call read_inclusions(reader, card, scene)
                end if
             end select
          end associate
+      end do
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == "CONTACTPROPERTYASSIGNMENT") &
+            call read_properties(reader, reader%card(i), scene)
       end do
       if (i_contact > 0 .and. n == 0) call card_error(reader, reader%card(i_contact), "nothing " &
          // "is included; say what by *CONTACT INCLUSIONS, ALL EXTERIOR or by its data lines")
@@ -265,57 +269,101 @@ contains
       surface%is_exterior = .true.
    end subroutine find_exterior
 
-   !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
-   !> mean the same, hard contact; pads, restitution, friction and damping are of pairs only.
-   subroutine check_properties(reader, card, scene)
+   !> *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction; a later line counts more.
+   !>
+   !> Without the first name it means all surfaces, without the second the first one and itself.
+   !> Pads and pressures are of pairs only: one surface in contact with itself cannot have them.
+   subroutine read_properties(reader, card, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      type(scene_t), intent(in) :: scene
-      character(len=*), parameter :: &
-         by_pair = "list the surfaces that need it by *CONTACT PAIR"
+      type(scene_t), intent(inout) :: scene
       type(data_t) :: data
       character(len=:), allocatable :: name
-      integer :: i, side
+      integer :: i, one, other
 
       call data_open(data, card)
       do while (next_line(reader, data))
          call check_count(reader, data, 3, 3, "surface, surface, surface interaction")
          if (.not. data%ok) cycle
-         do side = 1, 2
-            if (is_blank(data, side)) cycle
-            call get_name(reader, data, side, "surface", name)
-            if (.not. data%ok .or. reader%doubt%names .or. name == "GLOBAL") cycle
-            if (name_index_find(reader%names%surfaces, name) == 0) call data_error(reader, data, &
-               "unknown surface " // quoted(name) // suggestion(name, surface_names(scene%surface)))
-         end do
+         call get_side(reader, data, scene, 1, one)
+         other = one
+         if (.not. is_blank(data, side_of_other)) call get_side(reader, data, scene, &
+            side_of_other, other)
          call get_name(reader, data, 3, "surface interaction", name)
          if (.not. data%ok) cycle
          i = name_index_find(reader%names%interactions, name)
          if (i == 0) then
             call refuse_name(reader, data, "surface interaction", name, reader%interaction_name)
-         else
-            associate (given => reader%interaction(i))
-               call refuse(given%restitution < 1.0_wp, "RESTITUTION below 1", by_pair)
-               call refuse(given%friction > 0.0_wp, "*FRICTION", by_pair)
-               call refuse(given%damping%coefficient > 0.0_wp, "*CONTACT DAMPING", by_pair)
-               call refuse(given%pressure%kind /= pressure_hard, "a PRESSURE-OVERCLOSURE that " // &
-                  "is not HARD", by_pair)
-               call refuse(given%offset > 0.0_wp, "a PAD THICKNESS", by_pair)
-            end associate
+         else if (min(one, other) >= 0 .and. .not. (reader%doubt%elements .or. &
+            reader%doubt%names)) then
+            call assign(reader, data, scene, one, other, i)
          end if
       end do
+   end subroutine read_properties
+
+   !> A surface that a line of properties is about.
+   subroutine get_side(reader, data, scene, side, surface)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: side                   !! field of the line
+      integer, intent(out) :: surface               !! 0: all; below 0: unknown, and told
+      character(len=:), allocatable :: name
+
+      surface = 0
+      if (is_blank(data, side)) return
+      call get_name(reader, data, side, "surface", name)
+      if (.not. data%ok .or. reader%doubt%names .or. name == "GLOBAL") return
+      surface = name_index_find(reader%names%surfaces, name)
+      if (surface > 0) return
+      surface = -1
+      call data_error(reader, data, "unknown surface " // quoted(name) // &
+         suggestion(name, surface_names(scene%surface)))
+      data%ok = .true.
+   end subroutine get_side
+
+   !> Interaction `i` for all pairs that a line is about.
+   subroutine assign(reader, data, scene, one, other, i)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(inout) :: scene
+      integer, intent(in) :: one, other             !! surfaces, 0: all
+      integer, intent(in) :: i
+      logical, allocatable :: is_meant(:)           ! each pair
+
+      associate (slave => scene%pair%slave, master => scene%pair%master)
+         allocate(is_meant, source=(is_of(one, slave) .and. is_of(other, master)) &
+            .or. (is_of(other, slave) .and. is_of(one, master)))
+      end associate
+      associate (given => reader%interaction(i))
+         call refuse(given%pressure%kind /= pressure_hard, "a PRESSURE-OVERCLOSURE that is not " &
+            // "HARD, which general contact does not have")
+         call refuse(given%offset > 0.0_wp, "a PAD THICKNESS, which general contact does not have")
+         call refuse(.not. any(is_meant) .and. (given%friction > 0.0_wp .or. given%restitution < &
+            1.0_wp .or. given%damping%coefficient > 0.0_wp), "properties for surfaces that no " &
+            // "line of *CONTACT INCLUSIONS names")
+         where (is_meant)
+            scene%pair%interaction = given
+         end where
+      end associate
 
    contains
 
-      subroutine refuse(has, what, instead)
+      elemental logical function is_of(wanted, given)
+         integer, intent(in) :: wanted, given
+
+         is_of = wanted == 0 .or. wanted == given
+      end function is_of
+
+      subroutine refuse(has, what)
          logical, intent(in) :: has
          character(len=*), intent(in) :: what
-         character(len=*), intent(in) :: instead     !! what to do
 
-         if (has) call data_error(reader, data, "the surface interaction " // quoted(name) // &
-            " has " // what // ", which general contact does not have: " // trim(instead))
+         if (has) call data_error(reader, data, "the surface interaction " // &
+            quoted(reader%interaction_name(i)%text) // " has " // what // ": list the surfaces " &
+            // "that need it by *CONTACT PAIR")
       end subroutine refuse
 
-   end subroutine check_properties
+   end subroutine assign
 
 end module emcon_deck_general_contact

@@ -87,7 +87,7 @@ contains
       logical, intent(in) :: may_turn              !! reference nodes may have a spin
       type(field_t), intent(inout) :: field
       type(data_t) :: data
-      integer, allocatable :: item(:)
+      integer, allocatable :: item(:), turning(:)
       integer :: dof
       real(wp) :: value
 
@@ -105,6 +105,9 @@ contains
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (.not. data%ok) cycle
          if (dof <= scene%n_dim) then
+            call split_turning(scene, item, turning)
+            if (size(turning) > 0 .and. may_turn) call put_spin(reader, data, scene, turning, &
+               last_freedom - size(field%spin, 1) + dof, value, field)
             field%value(dof, item) = value
             field%is_given(item) = .true.
          else if (dof > last_freedom - size(field%spin, 1) .and. may_turn) then
@@ -116,6 +119,18 @@ contains
          end if
       end do
    end subroutine read_values
+
+   !> The ROT NODEs of rigid bodies go out of a list of nodes; their reference nodes come back.
+   pure subroutine split_turning(scene, item, reference)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(inout) :: item(:)
+      integer, allocatable, intent(out) :: reference(:)
+      integer :: body(size(item)), i
+
+      body = [(findloc(scene%rigid%turning, item(i), 1), i = 1, size(item))]
+      reference = scene%rigid(pack(body, body > 0))%reference
+      item = pack(item, body == 0)
+   end subroutine split_turning
 
    !> The spin of the rigid bodies whose reference nodes `item` are.
    subroutine put_spin(reader, data, scene, item, dof, value, field)

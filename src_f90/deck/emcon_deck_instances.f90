@@ -129,7 +129,7 @@ contains
             if (.not. keeps_names .and. (option%name == "NSET" .or. option%name == "ELSET" &
                .or. (option%name == "NAME" .and. card%name == "SURFACE"))) then
                line = line // "=" // instance%name // "." // bare_name(option%value)
-            else if (option%name == "REFNODE") then
+            else if (option%name == "REFNODE" .or. option%name == "ROTNODE") then
                call instance_field(self, option%value, instance, is_label=.not. keeps_names &
                   .or. verify(option%value, digits) == 0, word=word)
                line = line // "=" // word

@@ -69,7 +69,7 @@ module emcon_deck_keywords
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
          // "ORIENTATION=,!OFFSET:0,~CONTROLS"), &
       keyword_t("ORIENTATION", in_model, "NAME=,SYSTEM=,~DEFINITION:COORDINATES"), &
-      keyword_t("RIGID BODY", in_model, "ELSET=,ANALYTICALSURFACE=,REFNODE=,!NSET,!ROTNODE," &
+      keyword_t("RIGID BODY", in_model, "ELSET=,NSET=,ANALYTICALSURFACE=,REFNODE=,ROTNODE=," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
@@ -107,6 +107,7 @@ module emcon_deck_keywords
       keyword_t("CHANGE FRICTION", in_step, "INTERACTION=,RESET,!AMPLITUDE,!ELEMENTSET," &
          // "!NODESET", has_data=.false.), &
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,~MASTER,~SLAVE," &
+         // "~ABSOLUTEPENETRATIONTOLERANCE,~RELATIVEPENETRATIONTOLERANCE," &
          // "!AUTOMATICTOLERANCES,!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MAXCHP,!PERRMX,!UERRMX," &
          // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
       keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,TIMEDELAY=,!LOADCASE:1," &
@@ -160,7 +161,7 @@ module emcon_deck_keywords
    type(refusal_t), parameter :: refusals(*) = [ &
       refusal_t("write what it couples as *EQUATION; what moves as a whole is a *RIGID BODY", &
          "MPC"), &
-      refusal_t("make the coupled part a *RIGID BODY, or couple its nodes by *EQUATION", &
+      refusal_t("make the coupled nodes a *RIGID BODY by NSET=, or write *EQUATION", &
          "COUPLING,KINEMATIC"), &
       refusal_t("spread the force over the nodes by *CLOAD, over faces by *DSLOAD", &
          "DISTRIBUTING"), &
@@ -324,6 +325,12 @@ contains
       case ("ALPHA")
          reason = " (the energy-momentum scheme has no numerical damping: *TIME INTEGRATION, " &
             // "SCHEME=GENERALIZED ALPHA has)"
+      case ("ABSOLUTEPENETRATIONTOLERANCE", "RELATIVEPENETRATIONTOLERANCE")
+         reason = " (contact is held exactly)"
+      case ("SLIPTOLERANCE", "ELASTICSLIP")
+         reason = " (what sticks does not move)"
+      case ("MASTER", "SLAVE")
+         reason = " (the card is about all pairs)"
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
       case ("NOSEPARATION")
@@ -346,10 +353,8 @@ contains
          call law_titles("HYPERELASTIC", reason)
          reason = " (laws are " // reason // ")"
       case ("ANALYTICALSURFACE", "NSET", "PINNSET", "TIENSET")
-         if (mark == mark_unsupported) reason = " (a rigid body is made of elements: ELSET=)"
+         if (mark == mark_unsupported) reason = " (its nodes are NSET=, its elements ELSET=)"
          if (mark == mark_without_effect) reason = " (it does not narrow what is written)"
-      case ("ROTNODE")
-         reason = " (degree of freedom 6 of the reference node is the rotation)"
       case ("READ")
          reason = " (use: emcon restart NAME.rst.h5)"
       case ("INSTANCE")

@@ -79,7 +79,8 @@ contains
       integer, allocatable :: item(:)
       logical, allocatable :: is_other(:)
       logical :: is_held(last_freedom), is_again
-      integer :: dof, i
+      integer, allocatable :: freedom(:)
+      integer :: i, k
 
       if (is_new(reader, card)) call drop_prescribed(self)
       call check_boundary_options(reader, card)
@@ -99,13 +100,9 @@ contains
          if (.not. data%ok) cycle
          allocate(is_other(size(item)), source=.false.)
          do i = 1, size(item)
-            new%node = item(i)
-            do dof = 1, scene%n_dim
-               if (is_held(dof)) call put(dof)
-            end do
-            if (.not. any(scene%rigid%reference == item(i))) cycle
-            do dof = 1, n_turn(scene%n_dim)
-               if (is_held(last_freedom - n_turn(scene%n_dim) + dof)) call put(scene%n_dim + dof)
+            call find_entries(scene, item(i), is_held, new%node, freedom)
+            do k = 1, size(freedom)
+               call put(freedom(k))
             end do
          end do
          if (any(is_other)) call data_warning(reader, data, "node " // &
@@ -125,6 +122,30 @@ contains
       end subroutine put
 
    end subroutine read_boundary
+
+   !> What a line prescribes by a node: its displacements, of reference nodes rotations too, and by
+   !> the ROT NODE of a rigid body the rotations of that.
+   pure subroutine find_entries(scene, item, is_held, node, freedom)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: item                  !! node of the line
+      logical, intent(in) :: is_held(:)            !! (last_freedom)
+      integer, intent(out) :: node                 !! that is prescribed
+      integer, allocatable, intent(out) :: freedom(:)   !! of it: rotations follow displacements
+      integer :: b, k
+
+      b = findloc(scene%rigid%turning, item, 1)
+      associate (n => scene%n_dim, n_turns => n_turn(scene%n_dim))
+         if (b > 0) then
+            node = scene%rigid(b)%reference
+            freedom = n + pack([(k, k = 1, n_turns)], is_held(:n_turns))
+         else
+            node = item
+            freedom = pack([(k, k = 1, n)], is_held(:n))
+            if (any(scene%rigid%reference == item)) freedom = [freedom, n + &
+               pack([(k, k = 1, n_turns)], is_held(last_freedom - n_turns + 1:))]
+         end if
+      end associate
+   end subroutine find_entries
 
    !> Of a rigid body the reference node is prescribed, and none other.
    subroutine check_rigid(reader, data, scene, is_held, item)
@@ -314,6 +335,14 @@ contains
       else if (new%place > scene%n_dim) then
          call data_error(reader, data, "degree of freedom " // to_text(new%place) &
             // " does not exist; known: " // freedoms_text(scene%n_dim))
+      else
+         do i = 1, size(item)
+            if (.not. any(scene%rigid%turning == item(i))) cycle
+            call data_error(reader, data, "node " // to_text(scene%node%label(item(i))) // &
+               " is the ROT NODE of a rigid body: in three dimensions no moments act on rigid " &
+               // "bodies; prescribe the rotation by *BOUNDARY, or let forces act")
+            return
+         end do
       end if
    end subroutine check_force
 

@@ -1,4 +1,4 @@
-!> *RIGID BODY: element sets that keep their shape, their reference nodes, how these turn.
+!> *RIGID BODY: elements and nodes that keep their shape, their reference nodes, how these turn.
 module emcon_deck_rigid
    use emcon_deck_dimension, only : n_plane
    use emcon_deck_labels, only : find_label
@@ -53,13 +53,16 @@ contains
       integer, allocatable :: node(:)
 
       new%origin = card%origin
-      if (has_option(card, "ELSET") .or. .not. has_option(card, "ANALYTICALSURFACE")) then
+      if (has_option(card, "ELSET") .or. .not. (has_option(card, "ANALYTICALSURFACE") .or. &
+         has_option(card, "NSET"))) then
          call find_elements(reader, card, scene, new)
       else
          allocate(new%element(0))
       end if
       call find_profile(reader, card, scene, new, node)
-      call find_reference(reader, card, scene, new%reference)
+      call find_nodes(reader, card, scene, new, node)
+      call find_node(reader, card, scene, "REFNODE", new%reference)
+      if (has_option(card, "ROTNODE")) call find_turning(reader, card, scene, new)
       if (.not. (allocated(new%element) .and. allocated(node)) .or. new%reference == 0) return
       if (reader%doubt%elements .or. reader%doubt%positions) return
       associate (of_element => scene%element%node(:, new%element))
@@ -72,6 +75,59 @@ contains
          // " lie " // trim(merge("on one line ", "in one plane", scene%n_dim == n_plane)) &
          // ", which tells no rotation; put the reference node beside it")
    end subroutine read_card
+
+   !> The nodes that NSET names join `node`, the elements that have no others the body.
+   subroutine find_nodes(reader, card, scene, new, node)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(rigid_body_t), intent(inout) :: new
+      integer, allocatable, intent(inout) :: node(:)   !! not allocated: something is wrong
+      character(len=:), allocatable :: name
+      logical :: is_in(size(scene%node%label))
+      integer :: i, e
+
+      if (.not. has_option(card, "NSET")) return
+      call need_name(reader, card, "NSET", name)
+      i = 0
+      if (name /= "") i = name_index_find(reader%names%node_sets, name)
+      if (i == 0) then
+         if (allocated(node)) deallocate(node)
+         if (name /= "" .and. .not. reader%doubt%names) call card_error(reader, card, &
+            "unknown node set " // quoted(name) // suggestion(name, set_names(scene%set%node)))
+         return
+      end if
+      if (.not. allocated(new%name)) new%name = name
+      if (.not. (allocated(node) .and. allocated(new%element))) return
+      associate (item => scene%set%node(i)%item)
+         is_in = .false.
+         is_in(item) = .true.
+         node = [node, item]
+      end associate
+      new%element = unique_sorted([new%element, pack([(e, e = 1, size(scene%element%label))], &
+         [(all(is_in(pack(scene%element%node(:, e), scene%element%node(:, e) > 0))) .and. &
+         scene%element%node(1, e) > 0, e = 1, size(scene%element%label))])])
+   end subroutine find_nodes
+
+   !> ROT NODE: in space its displacements stand for the rotations, as CalculiX has it.
+   subroutine find_turning(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(rigid_body_t), intent(inout) :: new
+
+      if (scene%n_dim == n_plane) then
+         call card_error(reader, card, "ROT NODE= is for three dimensions; here degree of " &
+            // "freedom 6 of the reference node is the rotation")
+         return
+      end if
+      call find_node(reader, card, scene, "ROTNODE", new%turning)
+      if (new%turning == 0 .or. reader%doubt%elements) return
+      if (new%turning == new%reference .or. any(scene%element%node == new%turning) .or. &
+         any(scene%rigid%turning == new%turning)) call card_error(reader, card, "ROT NODE " // &
+         to_text(scene%node%label(new%turning)) // " is used otherwise; its displacements are " &
+         // "rotations of this body alone: give a node that is in no element and in no other body")
+   end subroutine find_turning
 
    subroutine find_elements(reader, card, scene, new)
       type(reader_t), intent(inout) :: reader
@@ -129,39 +185,41 @@ contains
       end if
    end subroutine find_profile
 
-   !> The node that REF NODE names by its label, or by a set that holds it alone.
-   subroutine find_reference(reader, card, scene, node)
+   !> The node that REF NODE or ROT NODE names by its label, or by a set that holds it alone.
+   subroutine find_node(reader, card, scene, option, node)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
+      character(len=*), intent(in) :: option
       integer, intent(out) :: node               !! 0: there is none
-      character(len=:), allocatable :: name
+      character(len=:), allocatable :: name, title
       integer :: label, i
       logical :: is_number
 
       node = 0
-      name = option_name(card, "REFNODE")
-      if (name == "") call card_error(reader, card, "REF NODE= is missing: a node that is " // &
+      name = option_name(card, option)
+      title = option(:3) // " NODE"
+      if (name == "") call card_error(reader, card, title // "= is missing: a node that is " // &
          "prescribed, loaded and started in place of the body")
       if (name == "") return
       call read_integer(name, label, is_number)
       if (is_number) then
          node = find_label(reader%node_map, label)
          if (node == 0 .and. .not. reader%doubt%nodes) call card_error(reader, card, &
-            "the reference node " // name // " does not exist")
+            title // ": node " // name // " does not exist")
       else
          i = name_index_find(reader%names%node_sets, name)
          if (i == 0) then
             if (.not. reader%doubt%names) call card_error(reader, card, "unknown node set " // &
                quoted(name) // suggestion(name, set_names(scene%set%node)))
          else if (size(scene%set%node(i)%item) /= 1) then
-            call card_error(reader, card, "the reference node is one node, but node set " // name &
+            call card_error(reader, card, title // " is one node, but node set " // name &
                // " has " // to_text(size(scene%set%node(i)%item)))
          else
             node = scene%set%node(i)%item(1)
          end if
       end if
-   end subroutine find_reference
+   end subroutine find_node
 
    !> No node is of two rigid bodies.
    subroutine check_alone(reader, card, scene, new)

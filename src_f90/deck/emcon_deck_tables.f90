@@ -146,8 +146,9 @@ contains
       n_before = reader%log%n_errors
       call option_word(reader, card, "TIME", "STEP TIME, TOTAL TIME", word)
       table%is_total_time = word == "TOTALTIME"
-      call option_word(reader, card, "DEFINITION", "TABULAR", word, "PERIODIC, EQUALLY SPACED" // &
-         ", MODULATED, DECAY, SMOOTH STEP, USER", "amplitudes are tables")
+      call option_word(reader, card, "DEFINITION", "TABULAR, SMOOTH STEP", word, "PERIODIC, " // &
+         "EQUALLY SPACED, MODULATED, DECAY, USER", "give its values at enough times as a table")
+      table%is_smooth = word == "SMOOTHSTEP"
       call read_numbers(reader, card, "time or value", number)
       n = size(number)/2
       if (size(number) == 0) then

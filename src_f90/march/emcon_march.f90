@@ -143,7 +143,9 @@ contains
          if (step%time%max_increments > 0 .and. &
             state%clock%increment - state%clock%n_before >= step%time%max_increments) then
             call raise(error, err_analysis, "the " // to_text(step%time%max_increments) // &
-               " increments of *STEP, INC= are used up at time " // to_text(state%clock%time))
+               " increments of *STEP, INC= are used up at time " // to_text(state%clock%time) &
+               // " of " // to_text(state%clock%start_time + step%time%duration) // &
+               "; raise INC=, or let increments be longer")
             return
          end if
          if (state%clock%is_off_grid) then

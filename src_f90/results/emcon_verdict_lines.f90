@@ -197,7 +197,8 @@ contains
                "a surface")
             return
          end if
-         call note_add(lines, "overlap checked: " // to_text(check%n_piece) // " bodies, " // &
+         call note_add(lines, "overlap checked: " // to_text(check%n_piece) // &
+            trim(merge(" body,  ", " bodies,", check%n_piece == 1)) // " " // &
             to_text(check%n_facet) // trim(merge(" edges", " faces", size(check%low, 1) < 3)) // &
             "; deepest penetration " // &
             to_text(self%overlap%deepest, 3) // " of an element")

@@ -12,11 +12,14 @@ module emcon_amplitudes
    !> Times that are sums and products of increments are those of the table up to this part.
    real(wp), parameter :: time_noise = 16.0_wp*epsilon(1.0_wp)
 
-   !> Factor over time: linear between the points, constant outside.
+   !> Factor over time: linear or smooth between the points, constant outside.
    type :: amplitude_t
       character(len=:), allocatable :: name
       type(origin_t) :: origin
       logical :: is_total_time = .false.             !! else time since the start of the step
+      !> Between two points by a polynomial of degree 5 whose slope and curvature are 0 at both;
+      !> else by a line.
+      logical :: is_smooth = .false.
       real(wp), allocatable :: time(:)               !! ascending [T]
       real(wp), allocatable :: value(:)
    end type amplitude_t
@@ -44,9 +47,30 @@ contains
          i = count(amplitude%time < left)
          slope = (amplitude%value(i + 1) - amplitude%value(i)) &
             /(amplitude%time(i + 1) - amplitude%time(i))
-         value = amplitude%value(i) + slope*(time - amplitude%time(i))
+         if (amplitude%is_smooth) then
+            call ease(amplitude, i, time, value, slope)
+         else
+            value = amplitude%value(i) + slope*(time - amplitude%time(i))
+         end if
       end if
    end subroutine find_amplitude_value
+
+   !> Value and slope between the points `i` and i + 1 of a smooth amplitude: with x from 0 to 1
+   !> between them the change is times x**3 (10 - 15 x + 6 x**2), the slope 30 x**2 (1 - x)**2.
+   pure subroutine ease(amplitude, i, time, value, slope)
+      type(amplitude_t), intent(in) :: amplitude
+      integer, intent(in) :: i
+      real(wp), intent(in) :: time                   !! between them [T]
+      real(wp), intent(out) :: value                 !! factor
+      real(wp), intent(out) :: slope                 !! [1/T]
+      real(wp) :: change, span, x
+
+      change = amplitude%value(i + 1) - amplitude%value(i)
+      span = amplitude%time(i + 1) - amplitude%time(i)
+      x = min(max((time - amplitude%time(i))/span, 0.0_wp), 1.0_wp)
+      value = amplitude%value(i) + change*(x**3*(10.0_wp - x*(15.0_wp - 6.0_wp*x)))
+      slope = 30.0_wp*(x*(1.0_wp - x))**2*(change/span)
+   end subroutine ease
 
    !> At which points of its table does an amplitude change its slope?
    pure function amplitude_corners(amplitude) result(is_corner)
@@ -55,6 +79,8 @@ contains
       real(wp) :: slope(0:size(amplitude%time))
       integer :: i, n
 
+      is_corner = .false.
+      if (amplitude%is_smooth) return
       n = size(amplitude%time)
       slope = 0.0_wp
       do i = 1, n - 1

@@ -12,8 +12,10 @@ module emcon_rigid_bodies
 
    type :: rigid_body_t
       type(origin_t) :: origin
-      character(len=:), allocatable :: name          !! of the element set
+      character(len=:), allocatable :: name          !! of the set or the surface
       integer :: reference = 0                       !! node that is fixed, driven and loaded
+      !> Node whose displacements, in the cards of a deck, are the rotations of the body; 0: none.
+      integer :: turning = 0
       integer, allocatable :: element(:)             !! ascending
       integer, allocatable :: node(:)                !! ascending; with the reference node
       integer, allocatable :: frame(:)               !! (n_dim + 1) the reference node comes first

@@ -76,13 +76,13 @@ def main() -> None:
     parser.add_argument("--bulk", type=float, default=200.0, help="modulus (default: 200)")
     parser.add_argument("--program", default=PROGRAM, help="another emcon")
     options = parser.parse_args()
-    print("| mesh | solver | cells | freedoms | residuals | factors | residual [s] | assemble | "
+    print("| mesh | solver | cells | unknowns | residuals | factors | residual [s] | assemble | "
           "factorise | solve | read [s] | all [s] | memory [MB] |\n" + "|---"*13 + "|")
     for size in options.cells:
         cells = tuple(map(int, size.split("x")))
         for solver in options.solver:
             print("| " + " | ".join(measure(cells, solver, options)) + " |", flush=True)
-    print("an increment each, but for what is read and all; seconds of the processor")
+    print("seconds of CPU per increment; read and all are those of the run")
 
 
 if __name__ == "__main__":

@@ -254,8 +254,9 @@ def refusal_lines(told):
     rows = sorted(has, key=lambda each: (-len(alone.get(each, [])), -len(has[each]), each))
     shown = [each for each in rows if each in alone or len(first.get(each, [])) > 3]
     accepted = sum(not words for words in told.values())
-    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. What refuses the others, "
-            "but for words that open none alone and come first in three decks and fewer:", "",
+    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. The table has the words "
+            "for which others are refused. A word counts if it is the only one in some deck, or the first one "
+            "in more than three:", "",
             *table(["word", "decks that have it", "refused by it first", "opened by it alone"],
                    [(f"`{each}`" if each.startswith(("*", "TYPE")) else each, len(has[each]),
                      len(first.get(each, [])),

@@ -167,6 +167,17 @@ def test_the_same_displacement_twice_is_no_contradiction(tmp_path):
     assert "otherwise" not in done.errors
 
 
+def test_a_smooth_step_between_the_times_of_an_amplitude(tmp_path):
+    """x^3 (10 - 15 x + 6 x^2) at a quarter, a half, three quarters; the word of Abaqus."""
+    text = BAR.replace("*BOUNDARY", "*AMPLITUDE, NAME=EASE, DEFINITION=SMOOTH STEP\n"
+                       "0., 0., 1., 1.\n*BOUNDARY")
+    done = run(tmp_path, text + "*STEP\n*STATIC, DIRECT\n0.25, 1.\n*BOUNDARY, AMPLITUDE=EASE\n"
+               f"END, 2, 2, 0.1\n{PRINT}*END STEP\n")
+    time, u = done.series("ALL", "U")
+    for t, factor in ((0.25, 0.103515625), (0.5, 0.5), (0.75, 0.896484375), (1.0, 1.0)):
+        assert u[time == t][0, 2:, 1] == pytest.approx(0.1*factor*np.ones(2), rel=DIGITS, abs=0)
+
+
 @pytest.mark.parametrize("option, middle", [("", 0.05), (", AMPLITUDE=LATE", 0.0)])
 def test_a_displacement_before_the_first_step_is_one_of_that_step(option, middle, tmp_path):
     text = BAR + f"*BOUNDARY{option}\nEND, 2, 2, 0.1\n" + static("", "")
@@ -518,7 +529,7 @@ TIP, WALL
 
 @pytest.mark.parametrize(("card", "told"), [
     ("*MPC\nBEAM, 1, 2\n", "write what it couples as *EQUATION; what moves as a whole is a *RIGID BODY"),
-    ("*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=S\n", "make the coupled part a *RIGID BODY"),
+    ("*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=S\n", "make the coupled nodes a *RIGID BODY"),
     ("*DISTRIBUTING\n1, 3\n", "spread the force over the nodes by *CLOAD"),
     ("*EMBEDDED ELEMENT\nE\n", "join their surfaces by *TIE"),
     ("*SPRING, ELSET=E\n", "use a strip of soft solid elements"),

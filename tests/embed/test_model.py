@@ -204,6 +204,40 @@ def test_conditions_at_many_nodes_take_a_value_for_each() -> None:
         assert stepper.u[3].tolist() == pytest.approx([0.025, 0.0], rel=1e-14)
 
 
+def test_rigid_bodies_of_space_turn_by_calls() -> None:
+    """A free top: spins in degrees of freedom 4 to 6, or about an axis; then it is turned, as prescribed."""
+    mesh = block((0.0, 0.0, 0.0), (1.0, 1.0, 2.0), (1, 1, 2), "TOP", kind="C3D8")
+    spin, centre = (0.5, -0.25, 2.0), np.array((0.5, 0.5, 1.0))
+    length = float(np.linalg.norm(spin))
+    kinetic = []
+    for way in ("freedoms", "axis"):
+        top = Model.from_mesh(mesh).material("M", density=1.0).section("M", "TOP")
+        top.add_nodes([centre], labels=[99])
+        top.rigid_body(None, 99, nodes="TOP")
+        if way == "axis":
+            top.rotating(99, length, velocity=(1.0, 0.0, 0.0), about=(centre - spin, centre))
+        else:
+            top.initial("VELOCITY", 99, (1, 4, 5, 6), (1.0, *spin))
+        top.step("DYNAMIC", 0.01, 0.02, direct=True, nlgeom=True)
+        with top.stepper() as stepper:
+            kinetic.append(stepper.energies()["kinetic"])
+            stepper.run()
+    # A rod of mass 2: 1/2 m v^2, and the moments of inertia 5/6, 5/6 and 1/3.
+    assert kinetic == pytest.approx([1.0 + 0.5*(5/6*(0.5**2 + 0.25**2) + 2.0**2/3)]*2, rel=1e-12)
+    bar = Model.from_mesh(mesh).material("M", elastic=(100.0, 0.3)).section("M", "TOP")
+    bar.add_nodes([(0.5, 0.5, 2.5)], labels=[99])
+    bar.rigid_body(None, 99, nodes="TOP_FRONT")
+    end = mesh.node_sets["TOP_FRONT"] - 1
+    bar.boundary("TOP_BACK").boundary(99, (1, 2, 3, 4, 5))
+    bar.step("STATIC", 0.5, 1.0, nlgeom=True).boundary(99, 6, np.pi/6)
+    with bar.stepper() as stepper:
+        stepper.run()
+        arm = mesh.nodes[end] - (0.5, 0.5, 2.0)
+        turned = stepper.u[end] + arm
+    c, s = np.cos(np.pi/6), np.sin(np.pi/6)
+    assert np.allclose(turned, arm @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), rtol=0, atol=1e-12)
+
+
 def test_steps_can_be_added_to_the_model_of_a_deck(tmp_path: Path) -> None:
     """A deck and a mesh are named by labels."""
     path = square().write(tmp_path/"square.inp")
@@ -242,8 +276,8 @@ def everything() -> Model:
     model.orientation("O", (1, 0, 0), (0, 1, 0))
     model.initial("DISPLACEMENT", "N", 1, 0.5)
     model.surface("S5", segments=[("START", 0.0, 0.0), ("LINE", 1.0, 0.0)], fillet_radius=0.1)
-    model.rigid_body("E2", 3, profile="S5").rotating("N", 0.5, velocity=(1.0, 0.0), about=(0.5, 0.5))
-    model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
+    model.rigid_body("E2", 3, nodes="N", profile="S5").rotating("N", 0.5, velocity=(1.0, 0.0), about=(0.5, 0.5))
+    model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME", definition="SMOOTH STEP")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
     model.interaction("I2", friction="rough")
     model.interaction("I3", pressure=("TABULAR", (0, 0), (5, 0.01)))
@@ -335,7 +369,8 @@ def test_all_keywords_of_the_reader_have_a_method() -> None:
                        ("STEP", "NAME")):
         known[name].remove(word)                 # labels that another program shows
     for name, word in (("CONTACTINTERFERENCE", "TYPE"), ("DYNAMIC", "APPLICATION"),
-                       ("CONTACTPRINT", "MASTER"), ("CONTACTPRINT", "SLAVE")):
+                       ("CONTACTPRINT", "MASTER"), ("CONTACTPRINT", "SLAVE"),
+                           ("RIGIDBODY", "ROTNODE")):
         known[name].remove(word)                 # what holds without them, in others' words
     missing = {name: options - written.get(name, set()) for name, options in known.items()
                if name not in written or not options <= written[name]}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -69,3 +70,32 @@ def test_no_function_has_a_result_of_deferred_length() -> None:
     assert len(sources) > 200
     assert {str(path.relative_to(ROOT)): names for path in sources
             if (names := deferred_results(path.read_text(encoding="utf-8")))} == {}
+
+
+STATICS = """
+from emcon import Model
+from emcon.mesh import block
+
+mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (8, 4, 4), "BAR", kind="C3D8")
+bar = Model.from_mesh(mesh).material("M", elastic=(100.0, 0.3)).section("M", "BAR").boundary("BAR_LEFT")
+bar.step("STATIC", 1.0, 1.0, nlgeom=True).boundary("BAR_RIGHT", 3, 0.1)
+with bar.stepper() as stepper:
+    stepper.run()
+    print(stepper.energies()["strain"].hex())
+"""
+
+
+def test_a_factor_is_made_whatever_threads_blas_may_have() -> None:
+    """Factors with fronts that OpenBLAS would share among threads: in a host that has set nothing, and in one with four."""
+    found = set()
+    for threads in (None, "1", "4"):
+        environment = {name: value for name, value in os.environ.items()
+                       if name not in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+        environment["PYTHONPATH"] = str(ROOT/"pywrap")
+        if threads is not None:
+            environment["OMP_NUM_THREADS"] = threads
+        done = subprocess.run([sys.executable, "-c", STATICS], capture_output=True, text=True, env=environment,
+                              timeout=60)
+        assert done.returncode == 0, done.stderr
+        found.add(done.stdout)
+    assert len(found) == 1

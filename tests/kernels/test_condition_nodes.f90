@@ -2,7 +2,7 @@
 module test_condition_nodes
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_condition_nodes, only : condition_include, condition_resize, condition_resize_slip, &
-      nodes_append
+      condition_take_slip, nodes_append
    use emcon_constraint, only : condition_t
    use emcon_edge_moments, only : edge_moments_t, form_begin
    use emcon_errors, only : error_t
@@ -21,6 +21,7 @@ contains
          test_case_t("each node once", test_append), &
          test_case_t("room that grows, never shrinks", test_resize), &
          test_case_t("more nodes, by nothing yet", test_include), &
+         test_case_t("slip over another motion, node by node", test_take_slip), &
          test_case_t("moments of an edge over its nodes, in order", test_moments)]
    end subroutine collect_condition_nodes
 
@@ -55,6 +56,50 @@ contains
          item%slip = 1.0_wp
       end do
    end subroutine test_resize
+
+   !> Both motions see nodes that the other does not: gradients go to their own nodes, none is lost,
+   !> and there is room for all of them.
+   subroutine test_take_slip(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(condition_t) :: item, over
+      integer, parameter :: before(3) = [7, 3, 9], after(4) = [7, 5, 3, 8], all_of(5) = [7, 5, 3, 8, 9]
+      real(wp) :: t1(3, 5, 2), g(3, 4), ht(12, 12, 2)
+
+      call begin(over, before)
+      call begin(item, after)
+      call draw_random(over%t1(:, :, 1))
+      call draw_random(over%t1(:, :, 2))
+      over%slip = [0.25_wp, -0.5_wp]
+      g = item%g
+      ht = item%ht
+      t1 = 0.0_wp
+      t1(:, [1, 3, 5], :) = over%t1
+      call condition_take_slip(item, over)
+      call check_equal(error, item%node(:item%n_node), all_of, "nodes")
+      call check_true(error, all(shape(item%t1) == [3, 5, 2]) .and. all(shape(item%t) == [3, 5, 2]) &
+         .and. all(shape(item%ht) == [15, 15, 2]), "there is no room for all nodes")
+      if (allocated(error)) return
+      call check_true(error, all(abs(item%t1 - t1) <= 0.0_wp), "gradients are those of other nodes")
+      call check_true(error, all(abs(item%g(:, :4) - g) <= 0.0_wp) .and. all(abs(item%ht(:12, :12, &
+         :) - ht) <= 0.0_wp), "what is known of the first nodes is lost")
+      call check_true(error, all(abs(item%slip - over%slip) <= 0.0_wp), "slip")
+
+   contains
+
+      !> A condition with friction over some nodes.
+      subroutine begin(self, node)
+         type(condition_t), intent(out) :: self
+         integer, intent(in) :: node(:)
+
+         self%has_friction = .true.
+         call condition_resize(self, size(node), 3)
+         self%node(:size(node)) = node
+         call condition_resize_slip(self)
+         call draw_random(self%g)
+         call draw_random(self%ht(:, :, 1))
+      end subroutine begin
+
+   end subroutine test_take_slip
 
    !> With room for them or not, and with second derivatives or not.
    subroutine test_include(error)

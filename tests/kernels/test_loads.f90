@@ -1,7 +1,7 @@
 !> Loads and prescribed motion over time and configuration.
 module test_loads
    use check, only : check_near, check_true, test_case_t
-   use emcon_amplitudes, only : amplitude_t
+   use emcon_amplitudes, only : amplitude_corners, amplitude_t, find_amplitude_value
    use emcon_csr, only : csr_find
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -43,6 +43,7 @@ contains
          test_case_t("bodies that turn about an axis", test_centrifugal), &
          test_case_t("a moment is a couple", test_moment), &
          test_case_t("amplitudes in step and total time", test_amplitude), &
+         test_case_t("smooth amplitudes", test_smooth), &
          test_case_t("ramp of a static step", test_ramp), &
          test_case_t("prescribed motion", test_motion)]
    end subroutine collect_loads
@@ -415,6 +416,27 @@ contains
             "forces in x and y")
       end do
    end subroutine test_amplitude
+
+   !> x**3 (10 - 15 x + 6 x**2) of each change, by hand at quarters and halves of two spans; the
+   !> slope is 0 at all points, so that none is a corner.
+   subroutine test_smooth(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(amplitude_t) :: table
+      real(wp), parameter :: time(7) = [0.5_wp, 1.0_wp, 1.25_wp, 2.0_wp, 4.0_wp, 6.0_wp, 9.0_wp], &
+         factor(7) = [0.0_wp, 0.0_wp, 0.4140625_wp, 4.0_wp, 3.0_wp, 2.0_wp, 2.0_wp], &
+         rate(7) = [0.0_wp, 0.0_wp, 4.21875_wp, 0.0_wp, -0.9375_wp, 0.0_wp, 0.0_wp]
+      real(wp) :: value(7), slope(7)
+      integer :: k
+
+      table = amplitude_t(name="A", time=[1.0_wp, 2.0_wp, 6.0_wp], &
+         value=[0.0_wp, 4.0_wp, 2.0_wp], is_smooth=.true.)
+      do k = 1, 7
+         call find_amplitude_value(table, time(k), value(k), slope(k))
+      end do
+      call check_near(error, value, factor, tol, 4.0_wp, "factors")
+      call check_near(error, slope, rate, tol, 4.0_wp, "slopes")
+      call check_true(error, .not. any(amplitude_corners(table)), "a smooth table has a corner")
+   end subroutine test_smooth
 
    !> From the value of the step before, over the 2 units of time of the step, and no farther;
    !> dynamic: at once.

@@ -62,6 +62,37 @@ def test_slope(tmp_path: Path, slope: float) -> None:
     dissipates(run)
 
 
+GENERAL = "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n*CONTACT PROPERTY ASSIGNMENT\n"
+
+
+@pytest.mark.parametrize("lines", [", , I\n", "GLOBAL, GLOBAL, I\n", ", , SLIPPERY\nALL_EXTERIOR, W, I\n"])
+def test_contact_of_all_with_all_has_the_friction_assigned_to_it(tmp_path: Path, lines: str) -> None:
+    """An elastic slab that is thrown onto a plane and turns: what a pair does; of two lines the later one counts."""
+    runs = []
+    for name, contact in (("pair", "*CONTACT PAIR, INTERACTION=I\nS1, W\n"), ("all", GENERAL + lines)):
+        text = on_floor(.3, .01, .2, (1., .2, 0), (0, 0, 1.), is_rigid=False).replace(
+            "*CONTACT PAIR, INTERACTION=I\nS1, W\n", "*SURFACE INTERACTION, NAME=SLIPPERY\n" + contact)
+        (tmp_path/name).mkdir()
+        runs.append(ran(tmp_path/name, text))
+    for column in ("kinetic", "friction_loss", "px"):
+        assert np.allclose(runs[0].history[column], runs[1].history[column], rtol=1e-9, atol=1e-12)
+    assert runs[1].history["friction_loss"][-1] > .01*runs[1].history["kinetic"][0]
+
+
+def test_contact_of_all_with_all_has_restitution_and_damping(tmp_path: Path) -> None:
+    """A rigid slab falls flat: it leaves at half its speed, then at less where the air is damped too."""
+    speed = []
+    for name, card in (("half", ""), ("damped", "*CONTACT DAMPING\n.2, .1, 0.\n")):
+        text = on_floor(0., .01, .2, (0, 0, -1.)).replace("*FRICTION\n0.0\n", card)
+        text = text.replace("NAME=I\n", "NAME=I, RESTITUTION=.5\n").replace(
+            "*CONTACT PAIR, INTERACTION=I\nS1, W\n", GENERAL + ", , I\n").replace(weight(), "")
+        (tmp_path/name).mkdir()
+        run = ran(tmp_path/name, text)
+        speed.append(run.history["pz"][-1]/.5)
+    assert speed[0] == pytest.approx(.5, rel=1e-10)
+    assert 0 < speed[1] < .5
+
+
 def test_turning_slip_is_of_second_order(tmp_path: Path) -> None:
     """A rigid slab slides across a slope, which turns its way: as a particle does."""
     slope, mu, until = .2, .3, .3

@@ -137,6 +137,40 @@ def test_a_held_body_is_a_clamp(tmp_path: Path) -> None:
     assert "free to rotate about x, rotate about y, rotate about z" in done.stderr
 
 
+def test_nodes_and_a_node_for_rotations_as_calculix_gives_them(tmp_path: Path) -> None:
+    """NSET= of all nodes and ROT NODE=: the body of its elements with degrees of freedom 4 to 6, bit for bit."""
+    text, _ = top("C3D8", CENTRE, TILT, SPIN, VELOCITY, dynamic(0.05, 20))
+    text = text.replace(f"*NODE\n{REFERENCE},", f"*NODE\n9998, 7., 7., 7.\n{REFERENCE},")
+    other = text.replace(f"*RIGID BODY, ELSET=ALL, REF NODE={REFERENCE}\n",
+                         f"*NSET, NSET=BODY, GENERATE\n1, 12\n*RIGID BODY, NSET=BODY, REF NODE={REFERENCE}, ROT NODE=9998\n")
+    for k in (1, 2, 3):
+        other = other.replace(f"{REFERENCE}, {k + 3}, ", f"9998, {k}, ")
+    assert other.count("9998, ") == 4
+    one, two = run(text, tmp_path/"elements").history, run(other, tmp_path/"nodes").history
+    for name in one.dtype.names:
+        if name not in ("wall", "cpu"):
+            assert np.array_equal(one[name], two[name], equal_nan=True), name
+
+
+def test_a_rigid_end_of_an_elastic_bar_is_turned(tmp_path: Path) -> None:
+    """Nodes of an elastic bar that move as a rigid body: a twist by ROT NODE ends as prescribed nodes do."""
+    mesh, angle = Block("C3D8", (4, 2, 2), (4, 1, 1)), 0.4
+    foot = "".join(f"{k}, 1, 3\n" for k in mesh.on(0, 0))
+    end = mesh.on(0, 1)
+    middle = np.array([5.0, 0.5, 0.5])                # beside the end: in its plane there were no frame
+    nodes = (f"*NODE\n9998, 0., 0., 9.\n{REFERENCE}, 5., .5, .5\n*NSET, NSET=END\n" + ",\n".join(map(str, end))
+             + f"\n*RIGID BODY, NSET=END, REF NODE={REFERENCE}, ROT NODE=9998\n")
+    step = "*STEP, NLGEOM\n*STATIC\n.25, 1.\n*BOUNDARY\n{}*NODE FILE\nU\n*END STEP\n"
+    turned = run(mesh.deck(LAW, f"{nodes}*BOUNDARY\n{foot}{REFERENCE}, 1, 3\n9998, 2, 3\n"
+                           + step.format(f"9998, 1, 1, {angle}\n")), tmp_path/"turned").fields()
+    places = Rotation.from_rotvec([angle, 0, 0]).apply(mesh.x[np.array(end) - 1] - middle) + middle
+    given = "".join(f"{k}, {i + 1}, {i + 1}, {float(u)!r}\n" for k, place in zip(end, places, strict=True)
+                    for i, u in enumerate(place - mesh.x[k - 1]))
+    wanted = run(mesh.deck(LAW, f"*BOUNDARY\n{foot}" + step.format(given)), tmp_path/"given").fields()["displacement"][-1]
+    found = turned["displacement"][-1][:len(wanted)]
+    assert np.abs(found - wanted).max() <= 1e-9*np.abs(wanted).max()
+
+
 @pytest.mark.parametrize("kind", ["DYNAMIC", "STATIC"])
 def test_a_driven_turn(kind: str, tmp_path: Path) -> None:
     """By the components of a rotation vector, in statics in a second step on to another, beside driven displacements:
