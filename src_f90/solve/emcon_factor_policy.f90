@@ -12,7 +12,7 @@ module emcon_factor_policy
    use emcon_evaluation, only : instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_is_straight, kept_factor_look, &
+      kept_factor_forget_rows, kept_factor_is_possible, kept_factor_is_straight, kept_factor_look, &
       kept_factor_multipliers, kept_factor_reach, &
       kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
@@ -78,6 +78,7 @@ contains
       logical, intent(out) :: is_lost                !! and `self%base` says how to make it again
 
       is_lost = .false.
+      call kept_factor_forget_rows(correction%kept)
       if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
       self%is_tried = self%is_allowed
       self%n_failure = 0
@@ -151,7 +152,7 @@ contains
          if (.not. correction%kept%is_made) call factor_policy_provide(self, correction, system, &
             motion, error)
          if (allocated(error)) return
-         call kept_factor_take(correction%kept, set, is_fit, error)
+         call kept_factor_take(correction%kept, set, .false., is_fit, error)
          if (allocated(error)) return
          self%knows_set = is_fit
       end if
