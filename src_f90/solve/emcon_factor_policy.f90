@@ -21,7 +21,8 @@ module emcon_factor_policy
    use emcon_system, only : system_t
    implicit none
    private
-   public :: factor_policy_t, factor_policy_step, factor_policy_begin, factor_policy_make, &
+   public :: factor_policy_t, factor_policy_step, factor_policy_offer, factor_policy_begin, &
+      factor_policy_make, &
       factor_policy_renew, factor_policy_correct, factor_policy_break_off, factor_policy_give_up, &
       factor_policy_commit, factor_policy_forget, factor_policy_looks, factor_policy_provide, &
       factor_policy_may_provide
@@ -98,6 +99,18 @@ contains
       self%n_excess = self%base%n_excess
       self%n_correction = 0
    end subroutine factor_policy_step
+
+   !> A solve beside the steps may make a factor for itself, for many contacts to be condensed by.
+   pure subroutine factor_policy_offer(self, correction)
+      type(factor_policy_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+
+      call factor_policy_forget(self, correction)
+      call kept_factor_forget_rows(correction%kept)
+      self%is_allowed = .false.
+      self%is_tried = kept_factor_is_possible(correction%kept)
+      self%n_failure = 0
+   end subroutine factor_policy_offer
 
    !> The last solve is over: how many corrections has it taken, beside the shortest one?
    pure subroutine count_solve(self)
