@@ -15,6 +15,7 @@ module emcon_layer
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
+   use emcon_factor_policy, only : factor_policy_offer
    use emcon_friction, only : friction_init, friction_t
    use emcon_gaps, only : gaps_forget
    use emcon_host, only : host_t
@@ -361,6 +362,7 @@ contains
 
       self%state%contacts%is_active = self%acts .and. .not. stays
       self%state%contacts%lam = self%lam
+      call offer_factor(self)
       do i = 1, merge(most_balances, 1, self%active%friction%is_on)
          before = self%motion%du
          call active_set_begin(self%active, self%system, self%motion, self%state)
@@ -377,6 +379,18 @@ contains
       end do
       if (any(have_closed(self) .and. .not. stays)) status = step_too_far
    end subroutine balance
+
+   !> Many contacts may be condensed by a factor of this balance. By a tangent they take room for
+   !> what each of them moves: more than W of that factor, however many they are.
+   pure subroutine offer_factor(self)
+      type(layer_t), intent(inout) :: self
+
+      associate (matrix => self%system%matrix, correction => self%newton%correction)
+         if (size(matrix%column) > 0) correction%kept%most_products = 1 + int(min( &
+            real(matrix%n_row, wp)**2, 0.5_wp*huge(1))/size(matrix%column))
+         call factor_policy_offer(self%newton%factor_policy, correction)
+      end associate
+   end subroutine offer_factor
 
    !> Does some friction act where it was expected, and not where it is? In the plane that is not
    !> asked.

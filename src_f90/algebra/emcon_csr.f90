@@ -12,7 +12,7 @@ module emcon_csr
    private
    public :: csr_t, csr_from_elements, csr_from_entries, csr_from_values, csr_sort_columns
    public :: csr_list_users, csr_find, csr_is_same, csr_copy_pattern, csr_copy_filled
-   public :: csr_multiply, csr_multiply_transposed, csr_transpose
+   public :: csr_multiply, csr_multiply_transposed, csr_pick_rows, csr_transpose
 
    type :: csr_t
       integer :: n_row = 0
@@ -260,6 +260,32 @@ contains
       call transpose_pattern(self, transposed%row_start, transposed%column, from)
       if (allocated(self%value)) transposed%value = self%value(from)
    end subroutine csr_transpose
+
+   !> Some rows, in their order there.
+   pure subroutine csr_pick_rows(self, row, picked)
+      type(csr_t), intent(in) :: self
+      integer, intent(in) :: row(:)              !! (any) of its rows
+      type(csr_t), intent(out) :: picked         !! (size(row) x n_col)
+      integer :: i
+
+      picked%n_row = size(row)
+      picked%n_col = self%n_col
+      allocate(picked%row_start(size(row) + 1), source=0)
+      do i = 1, size(row)
+         picked%row_start(i + 1) = picked%row_start(i) + self%row_start(row(i) + 1) &
+            - self%row_start(row(i))
+      end do
+      associate (n => picked%row_start(size(row) + 1))
+         allocate(picked%column(n), picked%value(n))
+      end associate
+      do i = 1, size(row)
+         associate (first => picked%row_start(i) + 1, last => picked%row_start(i + 1), &
+               from => self%row_start(row(i)) + 1, to => self%row_start(row(i) + 1))
+            picked%column(first:last) = self%column(from:to)
+            picked%value(first:last) = self%value(from:to)
+         end associate
+      end do
+   end subroutine csr_pick_rows
 
    !> Slot of the entry (i, j), both from 1; 0 if the pattern has no such entry.
    pure integer function csr_find(self, i, j)

@@ -63,7 +63,7 @@ contains
    !> The change of volume of points side by side, with its gradients.
    pure subroutine law_change_points_space(law, with_tangent, points)
       class(law_t), intent(in) :: law
-      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
+      logical, intent(in) :: with_tangent        !! else it and `at_end` stay as they are
       type(change_points_space_t), intent(inout) :: points     !! all but the strains is set
       type(law_slopes_t) :: w
       type(path_t) :: path
@@ -83,10 +83,11 @@ contains
          w%second(l, :, :) = v%h
       end do
       call find_stress(w%slope, path%n, points%stress)
+      if (.not. with_tangent) return
       call find_complement(path%last, last(:, :, 2))
       call find_cofactor(path%last, last(:, :, 3))
       call find_stress(slope, last, points%at_end)
-      if (with_tangent) call find_tangent(w, path, points%tangent)
+      call find_tangent(w, path, points%tangent)
    end subroutine law_change_points_space
 
    !> Response of laws that are no functions of the invariants alone, one by one.

@@ -80,7 +80,7 @@ contains
             do k = 1, explicit%set%n
                explicit%set%defect(k) = h*condition_rate(set%item(explicit%row(k)), explicit%v1)
             end do
-            call kept_factor_take(kept, explicit%set, is_fit, error)
+            call kept_factor_take(kept, explicit%set, .true., is_fit, error)
             if (.not. (is_fit .or. allocated(error))) call raise(error, err_analysis, &
                "the velocities at time " // to_text(self%state%clock%time, 9) &
                // " cannot be held: contacts, ties and equations depend on each other, or " // &

@@ -12,16 +12,16 @@ module emcon_factor_policy
    use emcon_evaluation, only : instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_look, &
-      kept_factor_multipliers, kept_factor_reach, &
-      kept_factor_renew, kept_factor_take
+      kept_factor_forget_rows, kept_factor_is_possible, kept_factor_look, &
+      kept_factor_multipliers, kept_factor_reach, kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
    use emcon_motion, only : at_rest, motion_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: factor_policy_t, factor_policy_step, factor_policy_begin, factor_policy_make, &
+   public :: factor_policy_t, factor_policy_step, factor_policy_offer, factor_policy_begin, &
+      factor_policy_make, &
       factor_policy_renew, factor_policy_correct, factor_policy_break_off, factor_policy_give_up, &
       factor_policy_commit, factor_policy_forget, factor_policy_looks, factor_policy_provide, &
       factor_policy_may_provide
@@ -76,6 +76,7 @@ contains
       logical, intent(out) :: is_lost                !! and `self%base` says how to make it again
 
       is_lost = .false.
+      call kept_factor_forget_rows(correction%kept)
       if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
       self%is_tried = self%is_allowed
       self%n_failure = 0
@@ -95,6 +96,18 @@ contains
       self%n_excess = self%base%n_excess
       self%n_correction = 0
    end subroutine factor_policy_step
+
+   !> A solve beside the steps may make a factor for itself, for many contacts to be condensed by.
+   pure subroutine factor_policy_offer(self, correction)
+      type(factor_policy_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+
+      call factor_policy_forget(self, correction)
+      call kept_factor_forget_rows(correction%kept)
+      self%is_allowed = .false.
+      self%is_tried = kept_factor_is_possible(correction%kept)
+      self%n_failure = 0
+   end subroutine factor_policy_offer
 
    !> The last solve is over: how many corrections has it taken, beside the shortest one?
    pure subroutine count_solve(self)
@@ -150,7 +163,7 @@ contains
          if (.not. correction%kept%is_made) call factor_policy_provide(self, correction, system, &
             motion, error)
          if (allocated(error)) return
-         call kept_factor_take(correction%kept, set, is_fit, error)
+         call kept_factor_take(correction%kept, set, .false., is_fit, error)
          if (allocated(error)) return
          self%knows_set = is_fit
       end if

@@ -4,8 +4,8 @@
 module emcon_factor_rows
    use emcon_kinds, only : dp
    use emcon_lapack, only : dense_cholesky_solve
-   use emcon_row_panels, only : panels_add, panels_fill_products, panels_subtract_products, &
-      row_panel_t
+   use emcon_row_pool, only : row_pool_add, row_pool_fill_products, row_pool_subtract_products, &
+      row_pool_t
    implicit none
    private
    public :: factor_rows_t, factor_rows_begin, factor_rows_make_room, factor_rows_fill_products, &
@@ -17,7 +17,8 @@ module emcon_factor_rows
       integer, allocatable :: index(:)           !! (>= start(n + 1)) unknowns, from 0
       real(dp), allocatable :: w(:)              !! (>= start(n + 1))
       real(dp), allocatable :: l(:, :)           !! (n, n) W^T W, or its factor
-      type(row_panel_t), allocatable :: panel(:) !! W, in place of `index` and `w`
+      logical :: by_panels = .false.             !! W is in `pool`, not in `index` and `w`
+      type(row_pool_t) :: pool
       real(dp), allocatable, private :: mu(:)    !! (n)
    end type factor_rows_t
 
@@ -32,7 +33,7 @@ contains
          if (self%n /= n) deallocate(self%l, self%start, self%mu)
       end if
       if (.not. allocated(self%l)) allocate(self%l(n, n), self%start(n + 1), self%mu(n))
-      if (allocated(self%panel)) deallocate(self%panel)
+      self%by_panels = .false.
       self%n = n
       self%start(1) = 0
    end subroutine factor_rows_begin
@@ -61,8 +62,8 @@ contains
       integer :: k, i, j
       real(dp) :: total
 
-      if (allocated(self%panel)) then
-         call panels_fill_products(self%panel, self%l)
+      if (self%by_panels) then
+         call row_pool_fill_products(self%pool, self%l)
          return
       end if
       y = 0.0_dp
@@ -90,8 +91,8 @@ contains
       real(dp), intent(inout) :: mu(:)           !! (n)
       integer :: k, j
 
-      if (allocated(self%panel)) then
-         call panels_subtract_products(self%panel, y, mu)
+      if (self%by_panels) then
+         call row_pool_subtract_products(self%pool, y, mu)
          return
       end if
       do k = 1, self%n
@@ -108,8 +109,8 @@ contains
       real(dp), intent(inout), contiguous :: y(:)    !! (n_unknown)
       integer :: k, j
 
-      if (allocated(self%panel)) then
-         call panels_add(self%panel, mu, y)
+      if (self%by_panels) then
+         call row_pool_add(self%pool, mu, y)
          return
       end if
       do k = 1, self%n

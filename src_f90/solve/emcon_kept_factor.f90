@@ -9,9 +9,9 @@
 !> which is zero only where residual and defects are: the age of L makes the way longer, not its
 !> end another one. Source: docs/theory.md, section 8.
 module emcon_kept_factor
-   use emcon_constraint, only : condition_t
+   use emcon_constraint, only : condition_t, most_slips
    use emcon_constraints, only : constraint_set_t
-   use emcon_csr, only : csr_find, csr_t
+   use emcon_csr, only : csr_find, csr_pick_rows, csr_t
    use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
       blocks_has_panels, blocks_reach, blocks_reach_rows, blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
@@ -22,14 +22,16 @@ module emcon_kept_factor
    use emcon_memory, only : memory_factors, memory_go_on, memory_t, memory_take
    use emcon_numbering, only : numbering_t
    use emcon_projected_gradients, only : projected_begin, projected_gradients_t, projected_solve
+   use emcon_row_panels, only : row_panel_t
+   use emcon_row_pool, only : row_pool_append, row_pool_find, row_pool_forget
    use emcon_solver_registry, only : solver_create
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    implicit none
    private
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
       kept_factor_let_iterate, kept_factor_look, kept_factor_serves, kept_factor_correct, &
-      kept_factor_forget, kept_factor_free, kept_factor_is_possible, kept_factor_has_room, &
-      kept_factor_multipliers, kept_factor_reach, kept_factor_condense, &
+      kept_factor_forget, kept_factor_forget_rows, kept_factor_free, kept_factor_is_possible, &
+      kept_factor_has_room, kept_factor_multipliers, kept_factor_reach, kept_factor_condense, &
       kept_factor_may_condense, kept_factor_settle, kept_factor_move
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
@@ -46,6 +48,8 @@ module emcon_kept_factor
    real(dp), parameter :: condensed_accuracy = 1.0e-4_dp
    !> From so many constraints on they go through factors of dense blocks together.
    integer, parameter :: least_panels = 200
+   !> So many times the rows of a set are kept at most.
+   real(dp), parameter :: most_pool = 1.5_dp
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
@@ -109,6 +113,14 @@ contains
       self%is_made = .false.
    end subroutine kept_factor_forget
 
+   !> No row that a set had is of use for others, as in the next step: a run that is resumed there
+   !> has none.
+   pure subroutine kept_factor_forget_rows(self)
+      type(kept_factor_t), intent(inout) :: self
+
+      call row_pool_forget(self%rows%pool)
+   end subroutine kept_factor_forget_rows
+
    !> Free what the solvers hold.
    subroutine kept_factor_free(self)
       type(kept_factor_t), intent(inout) :: self
@@ -127,6 +139,7 @@ contains
       integer :: k
 
       self%is_made = .false.
+      call kept_factor_forget_rows(self)
       call memory_go_on(self%memory)
       call blocks_analyse(self%blocks, matrix, is_new, error)
       call memory_take(self%memory, memory_factors)
@@ -169,17 +182,19 @@ contains
       kept_factor_has_room = n**2 <= self%most_products*merge(self%n_slot, n_entry, self%is_made)
    end function kept_factor_has_room
 
-   !> Take the constraints of `set` at their present gradients.
-   subroutine kept_factor_take(self, set, is_fit, error)
+   !> Take the constraints of `set` at their present gradients, or, of many, at nearly these.
+   subroutine kept_factor_take(self, set, is_exact, is_fit, error)
       type(kept_factor_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
+      logical, intent(in) :: is_exact            !! at these: no other correction follows
       logical, intent(out) :: is_fit             !! there is a factor, and one of W^T W, not t
       type(error_t), allocatable, intent(out) :: error
 
       is_fit = self%is_made .and. kept_factor_has_room(self, set%n_row, self%n_slot) &
          .and. .not. (self%blocks%is_incomplete .and. set%penalty%is_on)
       if (.not. is_fit) return
-      call reach_rows(self, set, error)
+      if (is_exact) call kept_factor_forget_rows(self)
+      call reach_rows(self, set, correction_accuracy, error)
       if (allocated(error)) return
       if (set%penalty%is_on) then
          self%product = self%rows%l
@@ -206,7 +221,7 @@ contains
          call condense_by_solutions(self, set, w, free, error)
          return
       end if
-      call reach_rows(self, set, error)
+      call reach_rows(self, set, condensed_accuracy, error)
       if (allocated(error)) return
       do k = 1, set%n_row
          w(k:, k) = real(self%blocks%scale*self%rows%l(k:, k), wp)
@@ -303,11 +318,12 @@ contains
       end do
    end subroutine multiply_rows
 
-   !> W of the constraints at their present gradients, and W^T W: in the measure of the factor, or
-   !> of the diagonal where that is incomplete.
-   subroutine reach_rows(self, set, error)
+   !> W of the constraints, and W^T W, at gradients that are `part` off at most: in the measure of
+   !> the factor, or of the diagonal where that is incomplete.
+   subroutine reach_rows(self, set, part, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor
       type(constraint_set_t), intent(in) :: set
+      real(dp), intent(in) :: part               !! by which gradients of rows may be others
       type(error_t), allocatable, intent(out) :: error
       integer :: k, n
 
@@ -317,12 +333,11 @@ contains
       end if
       if (.not. allocated(self%mu)) allocate(self%mu(set%n_row), self%bend(set%n_row))
       self%bend = 0.0_dp
-      self%n_forward = self%n_forward + set%n_row
       if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
-         call blocks_reach_rows(self%blocks, set%gap_rows, set%n_row, self%rows%panel, error)
-         if (.not. allocated(error)) call factor_rows_fill_products(self%rows, self%y)
+         call reach_panels(self, set, part, error)
          return
       end if
+      self%n_forward = self%n_forward + set%n_row
       do k = 1, set%n_row
          call factor_rows_make_room(self%rows, self%rows%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
@@ -342,6 +357,38 @@ contains
       end do
       call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
+
+   !> The same by panels: only of rows that the last sets did not have. Where these are many all are
+   !> made anew, as the others would take room.
+   subroutine reach_panels(self, set, part, error)
+      type(kept_factor_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(dp), intent(in) :: part
+      type(error_t), allocatable, intent(out) :: error
+      type(row_panel_t), allocatable :: panel(:)
+      type(csr_t) :: rows
+      integer :: name(set%n_row)
+      integer, allocatable :: missing(:)
+
+      associate (pool => self%rows%pool)
+         name = (1 + most_slips)*set%id(set%condition) + set%slip + 1
+         call row_pool_find(pool, name, set%gap_rows, part, missing)
+         if (size(missing) > 0 .and. real(pool%n + size(missing), dp) &
+            > most_pool*set%n_row) then
+            call row_pool_forget(pool)
+            call row_pool_find(pool, name, set%gap_rows, part, missing)
+         end if
+         if (size(missing) > 0) then
+            call csr_pick_rows(set%gap_rows, missing, rows)
+            call blocks_reach_rows(self%blocks, rows, size(missing), panel, error)
+            if (allocated(error)) return
+            call row_pool_append(pool, name, rows, missing, panel)
+            self%n_forward = self%n_forward + size(missing)
+         end if
+      end associate
+      self%rows%by_panels = .true.
+      call factor_rows_fill_products(self%rows, self%y)
+   end subroutine reach_panels
 
    !> Factorise W^T W with the compliance of contacts that give way, for their present slopes: none
    !> without slope pushes, and all are soft enough for the factor.

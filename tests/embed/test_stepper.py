@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT/"pywrap"))
+sys.path[:0] = [str(ROOT/name) for name in ("pywrap", "tests/scenes")]
+
+from space_mesh import Block  # noqa: E402
 
 from emcon.kernels import LAWS, law_response, nts_gap  # noqa: E402
 from emcon.stepper import AnalysisError, InputError, Stepper  # noqa: E402
@@ -107,6 +109,27 @@ def test_models_in_threads_give_the_bits_of_one_alone() -> None:
     for formulation, (totals, u) in zip(formulations, together):
         assert totals == alone[formulation][0]
         assert np.array_equal(u, alone[formulation][1])
+
+
+def test_orderings_in_threads_give_the_bits_of_one_alone(tmp_path: Path) -> None:
+    """METIS, which orders cubes of so many elements, draws from the generator of the process."""
+    def run(deck: Path) -> np.ndarray:
+        with Stepper(deck) as cube:
+            cube.step()
+            return cube.u
+
+    decks = []
+    for n in (12, 13):
+        mesh = Block("C3D8", (n, n, n))
+        held = "".join(f"{k}, 1, 3\n" for k in mesh.on(0, 0))
+        decks.append(tmp_path/f"cube{n}.inp")
+        decks[-1].write_text(mesh.deck(
+            "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n*DENSITY\n1.\n", f"*BOUNDARY\n{held}*STEP, NLGEOM\n"
+            "*DYNAMIC, DIRECT, SOLVER=DIRECT\n0.1, 0.1\n*DLOAD\nALL, GRAV, 1., 0., 0., -1.\n*END STEP\n"))
+    alone = [run(deck) for deck in decks]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(run, 6*decks))
+    assert all(np.array_equal(u, alone[k % 2]) for k, u in enumerate(together))
 
 
 def test_closed_models_leave_no_memory(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ contains
       call kept_factor_set_up(kept, row%code)
       call kept_factor_let_iterate(kept, .true.)
       call kept_factor_renew(kept, problem%base, error)
-      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
+      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, .true., is_fit, error)
       if (allocated(error)) return
       call check_true(error, is_fit .and. kept%blocks%is_incomplete, "it is an incomplete factor")
       if (allocated(error)) return
@@ -121,7 +121,7 @@ contains
       call check_condensed(problem, kept, k, g, error)
       if (allocated(error)) return
       problem%set%penalty%is_on = .true.
-      call kept_factor_take(kept, problem%set, is_fit, error)
+      call kept_factor_take(kept, problem%set, .true., is_fit, error)
       if (.not. allocated(error)) call check_true(error, .not. is_fit, "contacts that give way")
       call kept_factor_free(kept)
    end subroutine test_iterations
@@ -189,7 +189,7 @@ contains
          set%penalty%slope = [(0.5_wp**k, k = 1, m)]
          set%penalty%lack = [((-2.0_wp)**(k - m), k = 1, m)]
          set%penalty%slope(m) = 0.0_wp
-         call kept_factor_take(kept, set, is_fit, error)
+         call kept_factor_take(kept, set, .true., is_fit, error)
          if (allocated(error)) return
          call check_true(error, is_fit, "there is a factor")
          allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
@@ -263,7 +263,7 @@ contains
       call kept_factor_renew(kept, problem%base, error)
       if (allocated(error)) return
       call check_true(error, .not. kept%is_made, "no factor")
-      call kept_factor_take(kept, problem%set, is_fit, error)
+      call kept_factor_take(kept, problem%set, .true., is_fit, error)
       call check_true(error, .not. is_fit, "nothing to solve with")
       call kept_factor_free(kept)
    end subroutine test_indefinite
@@ -284,7 +284,7 @@ contains
          kept%most_products = k
          has_room = kept_factor_has_room(kept, problem%set%n, n_entry)
          call kept_factor_renew(kept, problem%base, error)
-         if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
+         if (.not. allocated(error)) call kept_factor_take(kept, problem%set, .true., is_fit, error)
          if (allocated(error)) return
          call check_true(error, is_fit .eqv. problem%set%n**2 <= k*n_entry, "taken")
          call check_true(error, is_fit .eqv. has_room, "foretold")
@@ -362,7 +362,7 @@ contains
       call make_symmetric(problem)
       call kept_factor_set_up(kept, solver_default)
       call kept_factor_renew(kept, problem%base, error)
-      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
+      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, .true., is_fit, error)
    end subroutine prepare
 
 end module test_kept_factor

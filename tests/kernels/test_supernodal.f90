@@ -4,13 +4,14 @@ module test_supernodal
    use, intrinsic :: iso_fortran_env, only : real32
    use check, only : check_near, check_true, test_case_t
    use emcon_cholmod, only : cholmod_t
-   use emcon_csr, only : csr_find, csr_from_values, csr_multiply, csr_t
+   use emcon_csr, only : csr_find, csr_from_values, csr_multiply, csr_pick_rows, csr_t
    use emcon_errors, only : error_t
    use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
       blocks_has_panels, blocks_reach, blocks_reach_rows, diagonal_blocks_t
    use emcon_kinds, only : dp, wp
-   use emcon_row_panels, only : panels_add, panels_fill_products, panels_subtract_products, &
-      row_panel_t
+   use emcon_row_panels, only : row_panel_t
+   use emcon_row_pool, only : row_pool_add, row_pool_append, row_pool_fill_products, &
+      row_pool_find, row_pool_forget, row_pool_subtract_products, row_pool_t
    use emcon_sparse_solver, only : matrix_definite
    use sparse_samples, only : quad_mesh_matrix
    implicit none
@@ -128,11 +129,9 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer, parameter :: n_row = 60
       type(diagonal_blocks_t) :: blocks
-      type(row_panel_t), allocatable :: panel(:)
       type(csr_t) :: rows
-      real(dp), allocatable :: w(:, :), part(:), y(:), expected(:)
-      real(dp), dimension(n_row, n_row) :: products, lower
-      real(dp) :: mu(n_row), found(n_row), value(3*n_row)
+      real(dp), allocatable :: w(:, :), part(:)
+      real(dp) :: value(3*n_row)
       integer, allocatable :: index(:)
       integer :: i, k, m, column(3*n_row), row(3*n_row)
       logical :: is_new, is_singular
@@ -161,26 +160,92 @@ contains
          if (allocated(error)) return
          w(index(:m) + 1, i) = part(:m)
       end do
-      call blocks_reach_rows(blocks, rows, n_row, panel, error)
       if (allocated(error)) return
-      call panels_fill_products(panel, products)
+      call check_pool(blocks, rows, w, error)
+      call blocks_free(blocks)
+   end subroutine check_rows
+
+   !> Sets of some rows, each in another order: what one has in common with those before is not made
+   !> again, and is nearly what is wanted.
+   subroutine check_pool(blocks, rows, w, error)
+      type(diagonal_blocks_t), intent(inout) :: blocks
+      type(csr_t), intent(in) :: rows
+      real(dp), intent(in) :: w(:, :)            !! (n_unknown, n) of these
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), parameter :: turned = 1.0e-3_dp
+      type(row_pool_t) :: pool
+      type(csr_t) :: near
+      integer, allocatable :: missing(:)
+      integer :: k
+
+      associate (n => rows%n_row)
+         call take_set(blocks, rows, [(k, k = 1, 2*n/3)], pool, error)
+         if (.not. allocated(error)) call check_set(pool, w(:, :2*n/3), error)
+         if (.not. allocated(error)) call take_set(blocks, rows, [(k, k = n, n/3, -1)], pool, error)
+         if (.not. allocated(error)) call check_set(pool, w(:, n:n/3:-1), error)
+         if (.not. allocated(error)) call take_set(blocks, rows, [(k, k = 1, n, 7)], pool, error)
+         if (.not. allocated(error)) call check_set(pool, w(:, 1:n:7), error)
+         if (allocated(error)) return
+         call check_true(error, pool%n == n, "each row is made once")
+         near = rows
+         near%value = (1.0_dp + turned)*near%value
+         call row_pool_find(pool, [(k, k = 1, n)], near, 2.0_dp*turned, missing)
+         call check_true(error, size(missing) == 0, "gradients that have turned by little")
+         call row_pool_find(pool, [(k, k = 1, n)], near, 0.1_dp*turned, missing)
+         call check_true(error, size(missing) == n - 1, "those that have turned by more")
+         call row_pool_forget(pool)
+         if (.not. allocated(error)) call take_set(blocks, rows, [(k, k = 2, n)], pool, error)
+         if (.not. allocated(error)) call check_set(pool, w(:, 2:), error)
+      end associate
+   end subroutine check_pool
+
+   !> The rows `which` as a set of the pool.
+   subroutine take_set(blocks, rows, which, pool, error)
+      type(diagonal_blocks_t), intent(inout) :: blocks
+      type(csr_t), intent(in) :: rows
+      integer, intent(in) :: which(:)
+      type(row_pool_t), intent(inout) :: pool
+      type(error_t), allocatable, intent(inout) :: error
+      type(row_panel_t), allocatable :: panel(:)
+      type(csr_t) :: of_set, lacking
+      integer, allocatable :: missing(:)
+
+      call csr_pick_rows(rows, which, of_set)
+      call row_pool_find(pool, which, of_set, 1.0e-2_dp, missing)
+      if (size(missing) == 0) return
+      call csr_pick_rows(of_set, missing, lacking)
+      call blocks_reach_rows(blocks, lacking, size(missing), panel, error)
+      if (.not. allocated(error)) call row_pool_append(pool, which, lacking, missing, panel)
+   end subroutine take_set
+
+   !> W of the present set, by products with itself and with vectors.
+   subroutine check_set(pool, w, error)
+      type(row_pool_t), intent(in) :: pool
+      real(dp), intent(in) :: w(:, :)            !! (n_unknown, n)
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), dimension(size(w, 2), size(w, 2)) :: products, lower
+      real(dp), dimension(size(w, 2)) :: mu, found
+      real(dp), dimension(size(w, 1)) :: y, expected
+      integer :: k
+
+      products = 0.0_dp
+      call row_pool_fill_products(pool, products)
       lower = matmul(transpose(w), w)
-      do k = 2, n_row
+      do k = 2, size(mu)
          lower(:k - 1, k) = 0.0_dp
       end do
       call check_near(error, real(products, wp), real(lower, wp), tol, 1.0_wp, "W^T W")
-      y = w(:, 3) - 0.5_dp*w(:, 40)
+      y = w(:, 2) - 0.5_dp*w(:, size(mu))
       mu = 1.0_dp
       found = mu
-      call panels_subtract_products(panel, y, found)
+      call row_pool_subtract_products(pool, y, found)
       call check_near(error, real(found, wp), real(mu - matmul(transpose(w), y), wp), tol, 1.0_wp, &
          "W^T y")
       call random_number(mu)
       expected = y + matmul(w, mu)
-      call panels_add(panel, mu, y)
+      call row_pool_add(pool, mu, y)
       call check_near(error, real(y, wp), real(expected, wp), tol, 1.0_wp, "W mu")
-      call blocks_free(blocks)
-   end subroutine check_rows
+   end subroutine check_set
 
    subroutine test_powers_of_two(error)
       type(error_t), allocatable, intent(out) :: error
