@@ -44,7 +44,7 @@ module emcon_kept_factor
    !> Of a correction by conjugate gradients: about what the age of a factor leaves.
    real(dp), parameter :: correction_accuracy = 1.0e-2_dp
    !> And of gaps in their multipliers alone: they tell which contacts act, and with two digits they
-   !> tell it wrongly too often.
+   !> tell it wrongly too often. So good are gradients of rows that are kept from set to set.
    real(dp), parameter :: condensed_accuracy = 1.0e-4_dp
    !> From so many constraints on they go through factors of dense blocks together.
    integer, parameter :: least_panels = 200
@@ -194,7 +194,7 @@ contains
          .and. .not. (self%blocks%is_incomplete .and. set%penalty%is_on)
       if (.not. is_fit) return
       if (is_exact) call kept_factor_forget_rows(self)
-      call reach_rows(self, set, correction_accuracy, error)
+      call reach_rows(self, set, condensed_accuracy, error)
       if (allocated(error)) return
       if (set%penalty%is_on) then
          self%product = self%rows%l
