@@ -73,13 +73,13 @@ contains
    end subroutine ease
 
    !> At which points of its table does an amplitude change its slope?
-   pure function amplitude_corners(amplitude) result(is_corner)
+   pure function amplitude_corners(amplitude) result(is_bend)
       type(amplitude_t), intent(in) :: amplitude
-      logical :: is_corner(size(amplitude%time))
+      logical :: is_bend(size(amplitude%time))
       real(wp) :: slope(0:size(amplitude%time))
       integer :: i, n
 
-      is_corner = .false.
+      is_bend = .false.
       if (amplitude%is_smooth) return
       n = size(amplitude%time)
       slope = 0.0_wp
@@ -87,7 +87,7 @@ contains
          slope(i) = (amplitude%value(i + 1) - amplitude%value(i)) &
             /(amplitude%time(i + 1) - amplitude%time(i))
       end do
-      is_corner = abs(slope(1:) - slope(:n - 1)) > slope_noise*max(abs(slope(1:)), &
+      is_bend = abs(slope(1:) - slope(:n - 1)) > slope_noise*max(abs(slope(1:)), &
          abs(slope(:n - 1)))
    end function amplitude_corners
 
