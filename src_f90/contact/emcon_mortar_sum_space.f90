@@ -41,7 +41,6 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       logical, intent(in) :: leaves_second       !! no second derivatives are asked for
       type(sight_t), intent(inout) :: sight(:)   !! (triangles of the facet)
-      real(wp), allocatable :: at(:, :), way(:, :)
       real(wp) :: part(0:1)
       integer :: k
 
@@ -49,26 +48,33 @@ contains
       do k = 1, size(sight)
          associate (stencil => self%stencil(first + k - 1))
             if (stencil%triangle == 0) cycle
-            if (allocated(at)) deallocate(at, way)
-            allocate(at(3, 3 + stencil%patch%n_vertex), way(3, 3 + stencil%patch%n_vertex))
-            call patch_stencil_gather(stencil, x, u0, du, at, way)
-            call patch_open(stencil%patch, at, way, leaves_second, sight(k)%open)
+            call look(stencil, x, u0, du, leaves_second, sight(k))
             if (sight(k)%open%n_vertex == 0) cycle
             part = part + 2.0_wp*patch_open_cover(sight(k)%open)/real(size(sight), wp)
-            associate (open => sight(k)%open)
-               sight(k)%is_used = patch_uses(stencil, open%vertex(:open%n_vertex))
-            end associate
-            sight(k)%node = pack(stencil%node(:stencil%n_node), sight(k)%is_used)
-            associate (open => sight(k)%open)
-               call patch_spread_list(stencil, open%vertex(:open%n_vertex), sight(k)%is_used, &
-                  sight(k)%spread)
-            end associate
          end associate
       end do
       if (.not. self%is_dual) return
       sight%is_full = all(abs(part - 1.0_wp) <= whole_cover)
       sight%is_blended = any(part > 0.0_wp) .and. .not. sight%is_full
    end subroutine mortar_sight
+
+   !> What one triangle sees.
+   pure subroutine look(stencil, x, u0, du, leaves_second, sight)
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      logical, intent(in) :: leaves_second
+      type(sight_t), intent(inout) :: sight
+      real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
+
+      call patch_stencil_gather(stencil, x, u0, du, at, way)
+      call patch_open(stencil%patch, at, way, leaves_second, sight%open)
+      if (sight%open%n_vertex == 0) return
+      associate (vertex => sight%open%vertex(:sight%open%n_vertex))
+         sight%is_used = patch_uses(stencil, vertex)
+         call patch_spread_list(stencil, vertex, sight%is_used, sight%spread)
+      end associate
+      sight%node = pack(stencil%node(:stencil%n_node), sight%is_used)
+   end subroutine look
 
    !> The sums of the triangles of a facet, from `first` on.
    pure subroutine mortar_facet_sums(self, first, sight, leaves_second, sums)

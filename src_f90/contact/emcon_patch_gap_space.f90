@@ -11,7 +11,8 @@ module emcon_patch_gap_space
    use emcon_patch_field_space, only : field_t, place_field
    use emcon_patch_look_space, only : patch_t, place_vertices
    use emcon_patch_moments_space, only : patch_misses, patch_moments, patch_products
-   use emcon_patch_sum_space, only : patch_sums_t, share_t, sums_make, sums_take
+   use emcon_patch_sum_space, only : patch_sums_t, sums_make, sums_mix, sums_mix_t, sums_take, &
+      sums_take_change
    implicit none
    private
    public :: patch_gap_t, patch_gap, patch_open_t, patch_open, patch_open_cover, &
@@ -140,14 +141,17 @@ contains
                                                  !! covered
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(patch_gap_t), intent(inout) :: gap
-      type(share_t) :: share
+      type(sums_mix_t) :: mix
+      real(wp), dimension(3, open%n_vertex) :: by, end_by
+      real(wp) :: f(0:1)
 
       call make_room(6 + 3*open%n_vertex, leaves_second, gap)
-      call sums_take(sums, weight, target, of_cover, leaves_second, share)
-      gap%f0 = share%f(0)
-      gap%f1 = share%f(1)
-      call gather_first(open%at, share%by, share%end_by, gap)
-      if (.not. leaves_second) call gather_second(open, share%by, share%change, gap)
+      mix = sums_mix(sums, weight, target, of_cover)
+      call sums_take(sums, mix, f, by, end_by)
+      gap%f0 = f(0)
+      gap%f1 = f(1)
+      call gather_first(open%at, by, end_by, gap)
+      if (.not. leaves_second) call gather_second(open, sums, mix, by, gap)
       if (sums%n_weight > 1 .and. .not. of_cover) call times_area(open%area, leaves_second, gap)
    end subroutine patch_gap_of
 
@@ -297,14 +301,18 @@ contains
    end subroutine gather_first
 
    !> Second derivatives by the frame and by the vertices: G change C^T, and those of the places.
-   pure subroutine gather_second(open, by, change, gap)
+   pure subroutine gather_second(open, sums, mix, by, gap)
       type(patch_open_t), intent(in) :: open
-      real(wp), intent(in), contiguous :: by(:, :), change(:, :)
+      type(patch_sums_t), intent(in) :: sums
+      type(sums_mix_t), intent(in) :: mix
+      real(wp), intent(in), contiguous :: by(:, :)       !! (3, n_vertex)
       type(patch_gap_t), intent(inout) :: gap
+      real(wp) :: change(3*open%n_vertex, 3*open%n_vertex)
       real(wp) :: left(6 + 3*open%n_vertex, 3*open%n_vertex)     ! G change
       real(wp) :: frame(6, 3*open%n_vertex), total(6), own(n_frame_var, n_frame_var)
       integer :: i, j, k, l, place(n_frame_var)
 
+      call sums_take_change(sums, mix, change)
       do j = 1, open%n_vertex
          frame(:, 3*j - 2:3*j) = open%at(j)%g(:6, :)
       end do

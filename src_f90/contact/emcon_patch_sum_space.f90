@@ -13,7 +13,7 @@ module emcon_patch_sum_space
    use emcon_patch_moments_space, only : patch_area_t
    implicit none
    private
-   public :: patch_sums_t, sums_make, sums_take, share_t
+   public :: patch_sums_t, sums_make, sums_mix_t, sums_mix, sums_take, sums_take_change
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
@@ -44,12 +44,12 @@ module emcon_patch_sum_space
       type(closing_t) :: closing
    end type patch_sums_t
 
-   !> A combination of them.
-   type :: share_t
-      real(wp) :: f(0:1)
-      real(wp), allocatable :: by(:, :), end_by(:, :)    !! (3, n_vertex)
-      real(wp), allocatable :: change(:, :)              !! (3 n_vertex, 3 n_vertex), if asked for
-   end type share_t
+   !> A combination of them, and what closes its gradient.
+   type :: sums_mix_t
+      real(wp), private :: part(3, of_height:of_one) = 0.0_wp    !! of each sum
+      real(wp), private :: factor = 0.0_wp       !! of weight times way [L]
+      real(wp), private :: by_rest = 0.0_wp      !! its slope by the rest
+   end type sums_mix_t
 
 contains
 
@@ -264,105 +264,99 @@ contains
       end associate
    end subroutine closing_change
 
-   !> The sum with the weights of `weight`, of heights from `target` or of 1.
-   pure subroutine sums_take(sums, weight, target, of_cover, leaves_second, share)
+   !> The combination by `weight`, of heights from `target` or of 1.
+   pure function sums_mix(sums, weight, target, of_cover) result(mix)
       type(patch_sums_t), intent(in) :: sums
       real(wp), intent(in) :: weight(:)          !! (>= n_weight)
       real(wp), intent(in) :: target             !! [L]
       logical, intent(in) :: of_cover            !! of 1: what is covered
-      logical, intent(in) :: leaves_second       !! no `change`
-      type(share_t), intent(out) :: share
+      type(sums_mix_t) :: mix
       real(wp) :: of_kind(of_height:of_one)      ! of each kind of field
-      real(wp) :: part(3, of_height:of_one)      ! of each sum
-      integer :: end, kind, w
+      real(wp) :: rest, size_of, ratio
+      integer :: k, w
 
       of_kind = [1.0_wp, -target]
       if (of_cover) of_kind = [0.0_wp, 1.0_wp]
-      part = 0.0_wp
       do w = 1, sums%n_weight
-         part(w, :) = weight(w)*of_kind
+         mix%part(w, :) = weight(w)*of_kind
       end do
-      do end = 0, 1
-         share%f(end) = sum(part*sums%f(:, :, end))
-      end do
-      associate (n => size(sums%by, 2))
-         allocate(share%by(3, n), share%end_by(3, n), source=0.0_wp)
-         if (.not. leaves_second) allocate(share%change(3*n, 3*n), source=0.0_wp)
-      end associate
-      do kind = of_height, sums%n_kind
-         do w = 1, sums%n_weight
-            if (.not. abs(part(w, kind)) > 0.0_wp) cycle
-            share%by = share%by + part(w, kind)*sums%by(:, :, w, kind)
-            share%end_by = share%end_by + part(w, kind)*sums%end_by(:, :, w, kind)
-            if (.not. leaves_second) share%change = share%change &
-               + part(w, kind)*sums%change(:, :, w, kind)
-         end do
-      end do
-      call close_sum(sums, part, of_kind, share)
-   end subroutine sums_take
-
-   !> What the gradient lacks, put on the ways of the vertices.
-   pure subroutine close_sum(sums, part, of_kind, share)
-      type(patch_sums_t), intent(in) :: sums
-      real(wp), intent(in) :: part(:, :)         !! (3, 2) of each sum
-      real(wp), intent(in) :: of_kind(:)         !! (2) of each kind of field
-      type(share_t), intent(inout) :: share
-      real(wp) :: rest, size_of, ratio, factor
-      integer :: a, j, k
-
-      rest = sum(part*sums%rest)
+      rest = sum(mix%part*sums%rest)
       size_of = tiny(size_of)
       do k = 1, size(sums%total, 3)
          size_of = max(size_of, maxval(abs(matmul(sums%total(:, :, k), of_kind))))
       end do
       ratio = (rest/(rounding*size_of))**2
       ratio = merge(ratio/(1.0_wp + ratio), 1.0_wp, ratio <= huge(ratio))
-      factor = ratio*rest/sums%closing%square
+      mix%factor = ratio*rest/sums%closing%square
+      mix%by_rest = ratio*(3.0_wp - 2.0_wp*ratio)/sums%closing%square
+   end function sums_mix
+
+   !> The values of a combination, and its gradients by places and heights.
+   pure subroutine sums_take(sums, mix, f, by, end_by)
+      type(patch_sums_t), intent(in) :: sums
+      type(sums_mix_t), intent(in) :: mix
+      real(wp), intent(out) :: f(0:1)            !! at both ends
+      real(wp), intent(out), contiguous :: by(:, :), end_by(:, :)    !! (3, n_vertex)
+      integer :: a, end, j, kind, w
+
+      do end = 0, 1
+         f(end) = sum(mix%part*sums%f(:, :, end))
+      end do
+      by = 0.0_wp
+      end_by = 0.0_wp
+      do kind = of_height, sums%n_kind
+         do w = 1, sums%n_weight
+            by = by + mix%part(w, kind)*sums%by(:, :, w, kind)
+            end_by = end_by + mix%part(w, kind)*sums%end_by(:, :, w, kind)
+         end do
+      end do
       associate (weight => sums%closing%weight, way => sums%closing%way)
          do j = 1, size(weight)
             do a = 1, at_eta
-               share%by(a, j) = share%by(a, j) + factor*weight(j)*way(a, j)
+               by(a, j) = by(a, j) + mix%factor*weight(j)*way(a, j)
             end do
          end do
       end associate
-      if (allocated(share%change)) call change_of_closing(sums, part, factor, &
-         ratio*(3.0_wp - 2.0_wp*ratio)/sums%closing%square, share%change)
-   end subroutine close_sum
+   end subroutine sums_take
 
-   !> Add how the closing term changes.
-   pure subroutine change_of_closing(sums, part, factor, by_rest, change)
-      type(patch_sums_t), intent(in) :: sums
-      real(wp), intent(in) :: part(:, :)         !! (3, 2) of each sum
-      real(wp), intent(in) :: factor             !! of weight times way [L]
-      real(wp), intent(in) :: by_rest            !! its slope by the rest
-      real(wp), intent(inout) :: change(:, :)    !! (3 n_vertex, 3 n_vertex)
+   !> How the first of these gradients changes with places and heights at the end.
+   pure subroutine sums_take_change(sums, mix, change)
+      type(patch_sums_t), intent(in) :: sums     !! with its changes
+      type(sums_mix_t), intent(in) :: mix
+      real(wp), intent(out), contiguous :: change(:, :)  !! (3 n_vertex, 3 n_vertex)
       real(wp) :: slope(size(change, 1))         ! of the factor
       integer :: a, i, j, k, kind, w
 
+      change = 0.0_wp
+      do kind = of_height, sums%n_kind
+         do w = 1, sums%n_weight
+            change = change + mix%part(w, kind)*sums%change(:, :, w, kind)
+         end do
+      end do
       slope = 0.0_wp
       do kind = of_height, of_one
          do w = 1, sums%n_weight
-            slope = slope + part(w, kind)*sums%by_rest(:, w, kind)
+            slope = slope + mix%part(w, kind)*sums%by_rest(:, w, kind)
          end do
       end do
       associate (closing => sums%closing)
-         slope = by_rest*slope - factor/closing%square*closing%by_square
+         slope = mix%by_rest*slope - mix%factor/closing%square*closing%by_square
          do k = 1, size(change, 2)
             do j = 1, size(closing%weight)
                do a = 1, at_eta
                   i = 3*(j - 1) + a
                   change(i, k) = change(i, k) + closing%way(a, j)*(closing%weight(j)*slope(k) &
-                     + factor*closing%weight_slope(k, j))
+                     + mix%factor*closing%weight_slope(k, j))
                end do
             end do
          end do
          do j = 1, size(closing%weight)
             do a = 1, at_eta
                i = 3*(j - 1) + a
-               change(i, i) = change(i, i) + factor*closing%weight(j)
+               change(i, i) = change(i, i) + mix%factor*closing%weight(j)
             end do
          end do
       end associate
-   end subroutine change_of_closing
+   end subroutine sums_take_change
 
 end module emcon_patch_sum_space
