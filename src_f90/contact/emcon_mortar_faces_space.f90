@@ -221,19 +221,24 @@ contains
       integer, intent(in) :: f                   !! 1..n_facet of the slave
       integer, intent(in) :: seen(:)             !! facets
       integer, allocatable :: near(:)            !! ascending
-      integer :: i, k
+      integer :: i, k, n, pass
 
-      allocate(near(0))
-      associate (master => self%sides%master)
+      do pass = 1, 2
+         n = 0
          do k = 1, size(seen)
-            do i = 1, size(master%corner, 1)
-               if (master%corner(i, seen(k)) == 0) exit
-               associate (node => master%corner(i, seen(k)))
-                  near = [near, master%around(master%around_start(node): &
-                     master%around_start(node + 1) - 1)]
-               end associate
-            end do
+            associate (master => self%sides%master, corner => self%sides%master%corner(:, seen(k)))
+               do i = 1, count(corner > 0)
+                  associate (first => master%around_start(corner(i)), &
+                        last => master%around_start(corner(i) + 1) - 1)
+                     if (pass == 2) near(n + 1:n + 1 + last - first) = master%around(first:last)
+                     n = n + 1 + last - first
+                  end associate
+               end do
+            end associate
          end do
+         if (pass == 1) allocate(near(n))
+      end do
+      associate (master => self%sides%master)
          near = unique_sorted(near)
          if (self%sides%rule%is_self) near = pack(near, [(mortar_itself_meets(self%itself, &
             self%sides%rule, master, f, near(k)), k = 1, size(near))])

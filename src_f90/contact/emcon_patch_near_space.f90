@@ -75,8 +75,7 @@ contains
          near%triangle = [((t, t = start(f(k)), start(f(k) + 1) - 1), k = 1, size(f))]
       end associate
       near%n = size(near%triangle)
-      near%beyond = reshape([((find_sorted(near%triangle, sides%triangles%beyond(k, &
-         near%triangle(t))), k = 1, 3), t = 1, near%n)], [3, near%n])
+      call find_beyond(near, sides, scope%facet)
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
       allocate(near%is_listed(near%n), near%is_apart(near%n), near%is_beside(near%n), &
          source=.false.)
@@ -112,6 +111,38 @@ contains
       if (sides%frames%of_triangles) call find_beside(near, patch_outline(sides, i, x, u), &
          origin, scope%beside + narrow_flange*sides%triangles%size(near%triangle))
    end subroutine patch_near_find
+
+   !> Which of the triangles are beyond each side of each.
+   pure subroutine find_beyond(near, sides, facet)
+      type(patch_near_t), intent(inout) :: near  !! with its triangles
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: facet(:)            !! ascending, of which all triangles are
+      integer :: before(size(facet)), i, k, m, n, side, t
+
+      allocate(near%beyond(3, near%n))
+      n = 0
+      do i = 1, size(facet)
+         before(i) = n
+         n = n + sides%triangles%split%start(facet(i) + 1) - sides%triangles%split%start(facet(i))
+      end do
+      n = 0
+      do i = 1, size(facet)
+         do m = 1, sides%triangles%split%start(facet(i) + 1) - sides%triangles%split%start(facet(i))
+            n = n + 1
+            do side = 1, 3
+               t = sides%triangles%beyond(side, near%triangle(n))
+               near%beyond(side, n) = 0
+               if (t == 0) cycle
+               associate (f => sides%triangles%split%facet(t))
+                  k = i
+                  if (f /= facet(i)) k = find_sorted(facet, f)
+                  if (k > 0) near%beyond(side, n) = before(k) + 1 + t &
+                     - sides%triangles%split%start(f)
+               end associate
+            end do
+         end do
+      end do
+   end subroutine find_beyond
 
    !> Find what is beside a triangle of the slave.
    pure subroutine find_beside(near, outline, origin, beside)
