@@ -46,6 +46,8 @@ module emcon_contact_newton
    !> After so many iterates without half of the best size the curvature of contacts is left out of
    !> the tangent for as many, and so on in turn.
    integer, parameter :: stall_turn = 7
+   !> After so many the laws are met as they are linearised, however far the forces are that do so.
+   integer, parameter :: exact_turn = 3
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
    !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
@@ -503,7 +505,8 @@ contains
          call lay_out(self, set)
          self%push = 0.0_wp
          if (level > 0) call soften(self, softer(level))
-         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true., self%slope)
+         call contact_parts_solve(self%problem, self%push, effort, is_solved, level > 0 .or. &
+            self%rest%n_stall < exact_turn, self%slope)
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)

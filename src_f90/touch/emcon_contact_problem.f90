@@ -43,6 +43,8 @@ module emcon_contact_problem
       real(wp), allocatable :: mu(:)                 !! (n) >= 0
       !> (n) of what a contact pushes at, where W knows how bodies move, too; 0: 1/W [M/T^2]
       real(wp), allocatable :: stiffness(:)
+      !> W is that of places which give way by a part of themselves: it is not singular
+      logical :: gives_way = .false.
    end type contact_problem_t
 
    !> What a solution has cost.
@@ -258,14 +260,24 @@ contains
          associate (row => m*(i - 1) + 1)
             do k = 0, self%n_slip
                slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:, k, i) &
-                  *(stiffness(i)*merge(loosely, proximal, self%n_slip > 1 &
-                  .or. self%hold(k, i) > 0.0_wp) &
+                  *(stiffness(i)*proximal_part(self, i, k) &
                   *give_of(self, i, k, stiffness(i)) - 1.0_wp), dp)
                slope(row + k, row + k) = slope(row + k, row + k) + 1.0_dp
             end do
          end associate
       end do
    end subroutine find_slope
+
+   !> By which part of its W row `k` of contact `i` is stiffer in a step.
+   pure real(wp) function proximal_part(self, i, k) result(part)
+      type(contact_problem_t), intent(in) :: self
+      integer, intent(in) :: i                       !! 1 to n
+      integer, intent(in) :: k                       !! 0, its gap; 1 to n_slip
+
+      part = proximal
+      if (.not. self%gives_way .and. (self%n_slip > 1 .or. self%hold(k, i) > 0.0_wp)) &
+         part = loosely
+   end function proximal_part
 
    !> What row `k` of contact `i` gives way by its own force [T^2/M]. A slip that no force changes,
    !> as one across a plane of symmetry, is taken to give way as its contact: its force stays where

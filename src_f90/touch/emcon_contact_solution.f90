@@ -1,17 +1,18 @@
 !> Forces that obey the law of a problem of contacts: which method comes when.
 !>
 !> Newton's method for the natural map of all places at once; where that does not come to an end
-!> place by place; the two take turns. Where slip has a direction the central path, and forces
-!> that stay near, come before that. After two turns, in the plane, by the method of Lemke for
-!> forces that push at a and at 0, whose matrix is copositive. Without friction, after a few trials,
-!> the least motion that closes no gap is found instead. Source: docs/theory.md, eq. (14i).
+!> place by place; the two take turns. Where slip has a direction the central path comes before
+!> that, and a travel along forces that follow from others. After two turns, in the plane, by the
+!> method of Lemke for forces that push at a and at 0, whose matrix is copositive. Without friction,
+!> after a few trials, the least motion that closes no gap is found instead.
+!> Source: docs/theory.md, eq. (14i).
 module emcon_contact_solution
    use emcon_contact_path, only : contact_path
    use emcon_contact_problem, only : contact_effort_t, contact_problem_forces, &
       contact_problem_missed, contact_problem_motion, contact_problem_t, freely, nearly_met
    use emcon_contact_sweeps, only : contact_sweeps
    use emcon_contact_trials, only : contact_following, contact_nearing, contact_slope_t, &
-      contact_trials
+      contact_travelling, contact_trials
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_lemke, only : lemke_solve
@@ -65,10 +66,8 @@ contains
          end if
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         if (has_direction) call contact_path(self, push, effort%n_path, effort%n_trial, is_solved)
-         if (is_solved) return
-         if (has_direction) call contact_nearing(self, push, effort, is_one_of_several, is_solved)
-         is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
+         if (has_direction) call solve_with_direction(self, push, effort, is_one_of_several, &
+            is_solved)
          if (is_solved) return
          n_turn = merge(1, most_turns, has_direction .and. is_one_of_several)
       end associate
@@ -89,6 +88,25 @@ contains
       call take_back(self, push)
       call contact_trials(self, push, more_trials, effort%n_trial, is_solved)
    end subroutine contact_problem_solve
+
+   !> Along the central path; where that does not end near the forces there are, if that is
+   !> enough, and else as far from them as it takes.
+   subroutine solve_with_direction(self, push, effort, near_enough, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      type(contact_effort_t), intent(inout) :: effort    !! counted on
+      logical, intent(in) :: near_enough
+      logical, intent(out) :: is_solved
+
+      call contact_path(self, push, effort%n_path, effort%n_trial, is_solved)
+      if (is_solved) return
+      if (near_enough) then
+         call contact_nearing(self, push, effort, is_solved)
+         is_solved = is_solved .or. effort%n_near > 0
+      else
+         call contact_travelling(self, push, effort, is_solved)
+      end if
+   end subroutine solve_with_direction
 
    !> The same places without what holds them: what moves freely is held by round-off's root of it.
    subroutine let_go(self, apart)

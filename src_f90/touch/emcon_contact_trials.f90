@@ -10,7 +10,7 @@ module emcon_contact_trials
    use emcon_lapack, only : dense_lu, dense_lu_solve, dense_lu_t
    implicit none
    private
-   public :: contact_slope_t, contact_trials, contact_following, contact_nearing
+   public :: contact_slope_t, contact_trials, contact_following, contact_nearing, contact_travelling
 
    !> Trials of a nearing.
    integer, parameter :: near_trials = 20
@@ -21,6 +21,12 @@ module emcon_contact_trials
    !> and the least part that is not none.
    integer, parameter :: following_trials = 60, easy_trials = 5
    real(wp), parameter :: least_part = 1.0e-12_wp
+   !> Of a travel: by which power what a part falls by grows after few steps, and the most of it;
+   !> where it falls by no more than `bends` the way does. Steps of each part, and bends.
+   real(wp), parameter :: grows = 1.5_wp, most_less = 1.0e-2_wp, bends = 0.9_wp
+   integer, parameter :: few_steps = 4, most_steps = 12, most_bends = 100
+   !> Forces that have grown by this have no end.
+   real(wp), parameter :: endless = 1.0_wp/epsilon(1.0_wp)
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -234,6 +240,95 @@ contains
       end do
    end subroutine contact_following
 
+   !> To forces that obey the law, however far those that follow from others have to go: along
+   !> solutions of places that give way by ever less about the forces at the start, and where their
+   !> way bends back from there anew. Where bodies have more contacts than ways to move these are
+   !> not closed all at once: gaps that miss each other by round-off trade all of their forces.
+   !> `push` is as far as it came.
+   subroutine contact_travelling(self, push, effort, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      type(contact_effort_t), intent(inout) :: effort    !! counted on
+      logical, intent(out) :: is_solved              !! the law is met
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: start, defect
+      real(wp) :: largest
+      integer :: bend
+
+      call contact_problem_map(self, push, defect, largest=largest)
+      largest = max(largest, maxval(abs(defect)))
+      do bend = 1, most_bends
+         start = push
+         call travel(self, endless*largest, start, push, effort, is_solved)
+         if (is_solved .or. .not. maxval(abs(push - start)) > 0.0_wp) return
+      end do
+   end subroutine contact_travelling
+
+   !> As far as the way from `start` leads.
+   subroutine travel(self, limit, start, push, effort, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: limit                  !! of forces [M L/T^2]
+      real(wp), intent(in) :: start(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) [M L/T^2]
+      type(contact_effort_t), intent(inout) :: effort    !! counted on
+      logical, intent(out) :: is_solved              !! the law is met
+      type(contact_problem_t) :: soft
+      real(wp) :: part, shrink, trial(0:self%n_slip, size(self%mu))
+      integer :: n_step
+      logical :: has_ended, has_begun
+
+      is_solved = .false.
+      has_begun = .false.
+      part = first_part
+      shrink = less
+      do
+         trial = push
+         call soften(self, start, part, soft)
+         call step_freely(soft, limit, trial, n_step, has_ended)
+         effort%n_trial = effort%n_trial + n_step
+         if (has_ended) then
+            has_begun = .true.
+            effort%n_near = effort%n_near + 1
+            push = trial
+            is_solved = contact_problem_missed(self, push) <= met
+            if (is_solved .or. part < least_part) return
+            if (n_step <= few_steps) shrink = max(shrink**grows, most_less)
+            part = shrink*part
+         else if (has_begun) then
+            part = part/shrink
+            shrink = sqrt(shrink)
+            if (shrink > bends) return
+            part = shrink*part
+         else
+            part = part/less
+            if (part > largest_part) return
+         end if
+      end do
+   end subroutine travel
+
+   !> Whole steps of Newton's method: over the limits of friction, which are round, a way that is to
+   !> gain at once leads nowhere.
+   subroutine step_freely(self, limit, push, n_step, has_ended)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: limit                  !! of forces [M L/T^2]
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      integer, intent(out) :: n_step
+      logical, intent(out) :: has_ended              !! the law is met
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: defect, step
+      real(wp) :: largest, row_size(0:self%n_slip, size(self%mu))
+      type(contact_slope_t) :: slope
+      logical :: is_singular
+
+      row_size = contact_problem_row_sizes(self)
+      do n_step = 0, most_steps
+         call contact_problem_map(self, push, defect, largest=largest)
+         has_ended = is_met(self, push, defect, row_size, largest)
+         if (has_ended .or. n_step == most_steps .or. .not. largest < limit) exit
+         call find_step(self, push, defect, slope, step, is_singular)
+         if (is_singular) exit
+         push = push + step
+      end do
+   end subroutine step_freely
+
    !> Trials of places that give way by a part of their own W about `start`.
    subroutine try_softly(self, start, part, push, most, n_trial, is_solved)
       type(contact_problem_t), intent(in) :: self
@@ -244,10 +339,22 @@ contains
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       type(contact_problem_t) :: soft
+
+      call soften(self, start, part, soft)
+      call contact_trials(soft, push, most, n_trial, is_solved)
+   end subroutine try_softly
+
+   !> Places that give way by a part of their own W about `start`.
+   pure subroutine soften(self, start, part, soft)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: start(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: part                   !! >= 0
+      type(contact_problem_t), intent(out) :: soft
       real(wp) :: more
       integer :: i, k, row
 
       soft = self
+      soft%gives_way = part > 0.0_wp
       do i = 1, size(self%mu)
          do k = 0, self%n_slip
             row = (1 + self%n_slip)*(i - 1) + 1 + k
@@ -256,18 +363,15 @@ contains
             soft%free(k, i) = self%free(k, i) - more*start(k, i)
          end do
       end do
-      call contact_trials(soft, push, most, n_trial, is_solved)
-   end subroutine try_softly
+   end subroutine soften
 
-   !> By trials of places that give way by a part of their own W about the forces so far, over and
-   !> over: forces that follow from others stay as near as can be to those before. The part grows
-   !> where the trials do not end, and falls where they do; where near enough will do not to what
-   !> they have failed at.
-   subroutine contact_nearing(self, push, effort, near_enough, is_solved)
+   !> By trials of places that give way by a part of their own W about the forces so far, a few
+   !> times over: forces that follow from others stay as near as can be to those before. The part
+   !> grows to what the trials end with, and falls no more below what they have failed at.
+   subroutine contact_nearing(self, push, effort, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       type(contact_effort_t), intent(inout) :: effort    !! counted on
-      logical, intent(in) :: near_enough             !! a few nearings do
       logical, intent(out) :: is_solved           !! the law is met
       real(wp) :: found(0:self%n_slip, size(self%mu)), part, least
       integer :: round
@@ -283,11 +387,11 @@ contains
             effort%n_near = effort%n_near + 1
             push = found
             is_solved = contact_problem_missed(self, push) <= met
-            if (is_solved .or. (near_enough .and. effort%n_near == few_nearings)) return
+            if (is_solved .or. effort%n_near == few_nearings) return
             part = max(least, less*part)
          else
             part = part/less
-            if (near_enough) least = part
+            least = part
             if (part > largest_part) return
          end if
       end do
