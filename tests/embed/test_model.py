@@ -206,7 +206,7 @@ def test_conditions_at_many_nodes_take_a_value_for_each() -> None:
 
 def test_a_section_of_all_of_a_mesh() -> None:
     """Without a set it is for all elements, of every kind; a set of that name that the mesh has stands."""
-    mesh = block((0.0, 0.0), (2.0, 1.0), (2, 1), "A") + block((3.0, 0.0), (5.0, 1.0), (2, 1), "B", kind="CPE3")
+    mesh = block((0.0, 0.0), (2.0, 1.0), (2, 1), "A") + block((3.0, 0.0), (2.0, 1.0), (2, 1), "B", kind="CPE3")
     assert len(mesh.elements) == 2
     model = Model.from_mesh(mesh).material("M", elastic=(100.0, 0.3), density=2.0).section("M", thickness=0.5)
     model.initial("VELOCITY", "ALL", 1, 3.0).step("DYNAMIC", 0.1, 0.1, nlgeom=True)
