@@ -195,6 +195,16 @@ def test_figures_mark_the_front_the_floor_and_the_goal() -> None:
     assert list(drawn["goal"].get_ydata()) == [0.05, 0.05]
 
 
+@pytest.mark.parametrize("tolerance", ["1e-6", "10"])
+def test_figures_reach_to_a_goal_far_from_all_errors(tolerance: str) -> None:
+    study = study_of(ERRORS, 0.02, f"impulse:{tolerance}")
+    axes = Figure().subplots()
+    _draw_work(axes, study, study.references[0], "impulse")
+    low, high = axes.get_ylim()
+    assert low < float(tolerance) < high
+    assert low < 0.01 and high > 0.04
+
+
 def test_the_price_may_leave_out_the_start() -> None:
     """Of two settings that meet the goal, by one the whole process is cheaper, by the other the
     increments."""

@@ -54,8 +54,10 @@ def _write(study: Study, reference: Reference, names: Sequence[str],
             drawer(axes, study, reference, name)
         for axes in panels[len(names):]:
             axes.set_axis_off()
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="lower center", ncols=_PER_LEGEND_ROW, frameon=False,
+        shown = {label: handle for axes in panels
+                 for handle, label in zip(*axes.get_legend_handles_labels())}
+        labels = [*shown]
+        figure.legend([*shown.values()], labels, loc="lower center", ncols=_PER_LEGEND_ROW, frameon=False,
                       fontsize=9)
         title = f"errors against {reference.kind}: {reference.title}"
         _arrange(figure, math.ceil(len(names)/_PER_ROW), math.ceil(len(labels)/_PER_LEGEND_ROW), title)
@@ -111,8 +113,9 @@ def _begin(axes: Axes, study: Study, reference: Reference, name: str,
     axes.set_yscale("log")
     errors = [error for _, error in all_points]
     level = reference.uncertainty(name)
-    low = min([*errors, *([level] if level > 0.0 else [])])
-    axes.set_ylim(0.3*low, 3.0*max(*errors, low))
+    goals = [goal.tolerance for goal in study.goals if goal.name == name]
+    low = min([*errors, *goals, *([level] if level > 0.0 else [])])
+    axes.set_ylim(0.3*low, 3.0*max(*errors, *goals, low))
     _floor(axes, reference, name)
     axes.set_ylabel("relative error" if name not in OWN else "value; 0 is right")
     return True
