@@ -409,8 +409,9 @@ contains
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          do i = 1, increment%notes%n
-            if (index(increment%notes%item(i)%text, "event: contact begins in pair 1") == 1) &
+            if (index(increment%notes%item(i)%text, "event: contact begins in pair 1") == 1) then
                n_told = n_told + 1
+            end if
          end do
          if (n_told > 0) exit
          call check_true(error, march%state%clock%time <= at, "none is passed")

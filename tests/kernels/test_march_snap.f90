@@ -270,8 +270,9 @@ contains
 
       n = 0
       do i = 1, verdict%warnings%n
-         if (index(verdict%warnings%item(i)%text, "at the end of step 1 STABILIZE carries ") == 1) &
+         if (index(verdict%warnings%item(i)%text, "at the end of step 1 STABILIZE carries ") == 1) then
             n = n + 1
+         end if
       end do
    end function count_told
 

@@ -235,8 +235,9 @@ contains
                end do
             end do
             ! One in a thousand ends within `small` of a joint.
-            if (any(abs(slope - gap%c) > fine) .or. any(abs(change - gap%h) > 10.0_wp*fine)) &
+            if (any(abs(slope - gap%c) > fine) .or. any(abs(change - gap%h) > 10.0_wp*fine)) then
                m = m + 1
+            end if
          end do
       end do
       call check_true(error, m <= 2, to_text(m) // " of " // to_text(40*n_shape) // " are wrong")
