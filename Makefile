@@ -156,11 +156,10 @@ APP_LIBS = $(LAPACK_LIBS) $(if $(filter file,$(origin HDF5_LIBS)),$(HDF5_APP_LIB
 # time of the library.
 FFLAGS_OF_holder := -O0 -g1
 
-# Rooms that read decks, write results and hand calls on: nothing in them is repeated for each element
-# or contact. They take a third less of the time to compile than by -O2.
+# Sources without a tag in rooms that read decks, write results and hand calls on (module_order.py
+# names them): nothing in them is repeated for each element or contact. They take a third less of the time to compile than by -O2.
 # -Wno-uninitialized: by -O1 gfortran 12 warns falsely of functions of arrays too.
 FFLAGS_OF_outer := -O1 -g1 -Wno-uninitialized
-OUTER_ROOMS := deck scene results record stepper border app
 
 # Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
 # whole of it at once. No sum over lanes, no fused product: with any VECTOR=... the bits are the same.
@@ -203,8 +202,6 @@ $(foreach tag,$(TAGS),$(eval $(call stored,$(BUILD)/flags_$(tag).txt,FFLAGS_OF_$
 $(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt Makefile
 	@$(PYTHON) $< $(O) $(BUILD)/mod '$(TAGS)' $(SRC) > $@.$$$$ && mv $@.$$$$ $@
 include $(BUILD)/order.mk
-TAGGED_outer := $(filter-out $(foreach tag,$(TAGS),$(TAGGED_$(tag))),$(basename \
-	$(notdir $(wildcard $(foreach room,$(OUTER_ROOMS),src_f90/$(room)/*.[fF]90)))))
 -include $(wildcard $(O)/*.d)
 endif
 
