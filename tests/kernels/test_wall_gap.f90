@@ -293,7 +293,8 @@ contains
          call wall_shape_make(shape, wall, middle, reach)
          do k = 1, size(shape%point, 2)
             spot = wall_find(wall, at, shape%point(:, k))
-            call check_near(error, spot%distance, 0.0_wp, tol, 1.0_wp, "on shape " // to_text(number))
+            call check_near(error, spot%distance, 0.0_wp, tol, 1.0_wp, "on shape " &
+               // to_text(number))
          end do
          do k = 1, size(shape%cell, 2)
             associate (x => shape%point(:, shape%cell(:, k)))
