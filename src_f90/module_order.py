@@ -13,7 +13,8 @@ A submodule stands on the .smod file of its parent, and nobody stands on a submo
 keeps there compiles one file.
 
 A comment `! build: TAG` in a source chooses flags that the Makefile keeps by that name (TAGS are
-those that it has, a blank between them): TAGGED_tag lists the files. A loop that threads share, or
+those that it has, a blank between them): TAGGED_tag lists the files. Sources of the rooms OUTER that
+have no such comment have the tag `outer`, if that is one of them. A loop that threads share, or
 what one does at a time, is the tag `threads` by itself.
 """
 
@@ -21,6 +22,8 @@ import pathlib
 import re
 import sys
 
+#: Rooms that read, write and hand on: nothing in them is repeated for each element or contact.
+OUTER = {"deck", "scene", "results", "record", "stepper", "border", "app"}
 END = r"\s*(?:!.*)?$"
 MODULE = re.compile(r"^\s*module\s+(?!procedure\b|subroutine\b|function\b)(\w+)" + END, re.I | re.M)
 SUBMODULE = re.compile(r"^\s*submodule\s*\(\s*(\w+)\s*(?::\s*(\w+)\s*)?\)\s*(\w+)" + END, re.I | re.M)
@@ -71,7 +74,9 @@ def tag(path, known):
             raise SystemExit(f"{path}:{number}: there is no build tag '{name}'; there are: {there}")
         if k > 0:
             raise SystemExit(f"{path}:{number}: the second build tag of a file, which has one")
-    return found[0][1] if found else ""
+    if found:
+        return found[0][1]
+    return "outer" if "outer" in known and path.parent.name in OUTER else ""
 
 
 def made_files(text):

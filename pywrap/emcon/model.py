@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .cards import Dof, Number, Where, array_of, card, real, text_lines, whole
-from .deck_text import element_table, table, write_text
+from .deck_text import element_table, set_text, table, write_text
 from .derivatives import check_law
 from .errors import InputError
 from .given import PointFunction, Solid, check_function, check_solid
@@ -108,7 +108,8 @@ class Model(Source):
                   parameters: Mapping[str, float | str] | None = None) -> Model:
         """The model of a mesh with its sets and surfaces, and a heading and `*PARAMETER` before it.
 
-        Nodes and elements are named by the labels of the mesh. `parameters`: see `parameter`.
+        Nodes and elements are named by the labels of the mesh; the sets ALL hold all nodes and all
+        elements, unless the mesh has sets of this name. `parameters`: see `parameter`.
         """
         model = cls._labelled()
         if heading:
@@ -117,6 +118,11 @@ class Model(Source):
             model.parameter(**parameters)
         model._nodes.n_dim = mesh.n_dim
         model._add(mesh.text())
+        for card, sets, labels in (
+                ("NSET", mesh.node_sets, mesh.node_labels),
+                ("ELSET", mesh.element_sets, np.concatenate([*mesh.element_labels.values()]))):
+            if not any(name.upper() == "ALL" for name in sets):
+                model._add(set_text(card, "ALL", labels))
         return model
 
     def __repr__(self) -> str:

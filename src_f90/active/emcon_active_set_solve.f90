@@ -48,8 +48,9 @@ contains
          end if
          call begin_sharp(self, system, newton, motion, is_done)
       end do
-      if (self%support%is_needed .and. any(status == [step_diverged, step_cycling])) &
+      if (self%support%is_needed .and. any(status == [step_diverged, step_cycling])) then
          call look_for_slide(self, system, scene, motion, status)
+      end if
    end subroutine active_set_solve
 
    !> No state of equilibrium was found: does a load move something along contacts that slide?

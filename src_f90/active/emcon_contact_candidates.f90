@@ -204,9 +204,10 @@ contains
             if (self%skip_until(pair)%passes .and. &
                .not. any(self%candidates%takes_part(first:last))) cycle
             call active_set_update_gaps(self, system, pair, motion, motion%du)
-            if (.not. near_laws_are_none(self%near_laws, system%contact(pair)%contact)) &
+            if (.not. near_laws_are_none(self%near_laws, system%contact(pair)%contact)) then
                call near_laws_update(self%near_laws, system, pair, self%candidates%acts, &
                self%candidates%have_changed)
+            end if
             call look_at_pair(self, system, pair, motion, k, status)
          end associate
       end do
@@ -297,8 +298,9 @@ contains
       associate (gap => contact%state(i))
          held = min(gap_to_hold(self, gap, id), self%start%left(1)*self%start%overclosure(id) &
             + gap%closed)
-         if (.not. self%rules%pushes_out .and. gap%gap0 < held - touch_tol*gap%size) &
+         if (.not. self%rules%pushes_out .and. gap%gap0 < held - touch_tol*gap%size) then
             held = gap%gap0
+         end if
          has_closed = gap%is_near .and. gap%is_over .and. gap%gap1 - held < -gap_noise*gap%size
       end associate
    end function has_closed

@@ -32,10 +32,12 @@ contains
             if (condition > set%n_permanent) then
                associate (kind => status(condition - set%n_permanent)%kind)
                   if (slip == 0 .and. kind == contact_open) off = max(0.0_wp, -set%defect(k))
-                  if (slip > 0 .and. kind == contact_rests) &
+                  if (slip > 0 .and. kind == contact_rests) then
                      off = abs(set%item(condition)%slip(slip))
-                  if (slip > 0 .and. any(kind == [contact_open, contact_free, contact_slides])) &
+                  end if
+                  if (slip > 0 .and. any(kind == [contact_open, contact_free, contact_slides])) then
                      off = 0.0_wp
+                  end if
                end associate
             end if
             defect = max(defect, off/set%item(condition)%size)

@@ -151,19 +151,19 @@ contains
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(in) :: motion
       logical, intent(in) :: gripped(:)          !! (n_constraint) before their trials
-      real(wp) :: use(self%set%n), friction(self%friction%n_slip, size(gripped))
+      real(wp) :: used(self%set%n), friction(self%friction%n_slip, size(gripped))
       logical :: turned(self%set%n), jams
       integer :: k
 
       self%support%grips = friction_holds(self%friction)
       turned = .false.
-      use = 0.0_wp
+      used = 0.0_wp
       friction = 0.0_wp
       do k = self%set%n_permanent + 1, self%set%n
          associate (id => self%set%id(k))
             turned(k) = self%candidates%acts(id) .and. gripped(id) &
                .and. .not. self%support%grips(id)
-            if (turned(k)) call friction_use(self%friction, self%set, k, friction(:, id), use(k))
+            if (turned(k)) call friction_use(self%friction, self%set, k, friction(:, id), used(k))
          end associate
       end do
       if (count(turned) < 2) return
@@ -171,8 +171,9 @@ contains
          friction, jams)
       if (.not. jams) return
       do k = self%set%n_permanent + 1, self%set%n
-         if (turned(k) .and. use(k) < alike*maxval(use)) &
+         if (turned(k) .and. used(k) < alike*maxval(used)) then
             self%friction%law(self%set%id(k))%status = slip_status_t()
+         end if
       end do
    end subroutine keep_hold
 

@@ -152,8 +152,9 @@ contains
       far = maxval(abs(direction))
       do k = 1, set%n
          associate (size_of => set%item(k)%size)
-            if (first*far > size_of .or. time - first <= deepest_tip*(size_of/far)) &
+            if (first*far > size_of .or. time - first <= deepest_tip*(size_of/far)) then
                is_first(set%id(k)) = .false.
+            end if
          end associate
       end do
       if (.not. any(is_first)) return

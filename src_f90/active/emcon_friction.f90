@@ -138,8 +138,9 @@ contains
       self%stops = .false.
       self%law%mu = self%mu
       call leave_still(self, system, motion)
-      if (.not. evaluation_is_equilibrium(motion%evaluation) .and. .not. self%n_slip > 1) &
+      if (.not. evaluation_is_equilibrium(motion%evaluation) .and. .not. self%n_slip > 1) then
          call find_targets(self, system, motion, was_active)
+      end if
    end subroutine friction_begin
 
    !> The slips of what acted, as `friction_begin` has it.
@@ -255,8 +256,9 @@ contains
                   own(:, node) = size
                   if (slides_by(contact, i, motion, own, still*still*size)) then
                      if (.not. (slides_by(contact, i, motion, size*free, still*still*size) &
-                        .or. slides_by(contact, i, motion, driven, rounding*size))) &
+                        .or. slides_by(contact, i, motion, driven, rounding*size))) then
                         self%law(before + i)%mu = 0.0_wp
+                     end if
                   end if
                   own(:, node) = 0.0_wp
                end associate
@@ -320,8 +322,9 @@ contains
       if (.not. self%looks_back) return
       do k = set%n_permanent + 1, set%n
          associate (law => self%law(set%id(k)), drag => set%item(k)%response%mu_sigma)
-            if (law%status%kind == contact_slides .and. any(abs(drag) > 0.0_wp)) &
+            if (law%status%kind == contact_slides .and. any(abs(drag) > 0.0_wp)) then
                law%status%direction = drag/norm2(drag)
+            end if
          end associate
       end do
    end subroutine friction_keep
@@ -397,18 +400,18 @@ contains
    end function friction_waits
 
    !> Friction of a contact of a set, and how much it is over what its push allows.
-   pure subroutine friction_use(self, set, k, tau, use)
+   pure subroutine friction_use(self, set, k, tau, used)
       type(friction_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: k                   !! > n_permanent
       real(wp), intent(out) :: tau(:)            !! (n_slip) [M L/T^2]
-      real(wp), intent(out) :: use               !! above 1: it slides
+      real(wp), intent(out) :: used              !! above 1: it slides
       real(wp) :: all(most_slips), most
 
       all = condition_friction(set%item(k), set%lam(k))
       tau = all(:size(tau))
       most = self%law(set%id(k))%mu*max(set%item(k)%normal*set%lam(k), 0.0_wp)
-      use = norm2(tau)/max(most, epsilon(most)*norm2(tau), tiny(most))
+      used = norm2(tau)/max(most, epsilon(most)*norm2(tau), tiny(most))
    end subroutine friction_use
 
    !> How far the laws of contact and friction are missed at worst, and the largest push.

@@ -346,8 +346,9 @@ contains
       integer :: k
 
       do k = set%n_permanent + 1, set%n
-         if (abs(set%item(k)%dgap) > self%newton%convergence%tolerance*set%item(k)%size) &
+         if (abs(set%item(k)%dgap) > self%newton%convergence%tolerance*set%item(k)%size) then
             has_changed(set%id(k) - self%n_before) = .true.
+         end if
       end do
    end subroutine mark_moved
 

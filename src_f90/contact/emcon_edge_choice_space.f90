@@ -268,8 +268,9 @@ contains
       associate (edges => self%edges)
          may_cross = merge(self%body(i) /= self%body(m) .or. edges%is_sharp(m), &
             edges%surface(i) /= edges%surface(m), self%is_self)
-         if ((edges%is_sharp(i) .eqv. edges%is_sharp(m)) .and. .not. edges%is_spoke(m)) &
+         if ((edges%is_sharp(i) .eqv. edges%is_sharp(m)) .and. .not. edges%is_spoke(m)) then
             may_cross = may_cross .and. merge(m > i, edges%surface(i) == self%first, self%is_self)
+         end if
          do k = 1, 2
             do j = 1, 2
                if (.not. may_cross) return

@@ -112,8 +112,9 @@ contains
          if (abs(self%place(f) - self%place(g)) <= 0.0_wp) is_slave = f < g
       else
          is_slave = self%length(f) < self%length(g)
-         if (abs(self%length(f) - self%length(g)) <= as_long*self%length(f)) &
+         if (abs(self%length(f) - self%length(g)) <= as_long*self%length(f)) then
             is_slave = rule%body(f) < rule%body(g)
+         end if
       end if
    end function is_slave
 

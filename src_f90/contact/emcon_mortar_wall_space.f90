@@ -244,8 +244,9 @@ contains
          if (state%is_arriving) state%was_open = state%gap0 >= -max_penetration_on_entry*state%size
          ! Behind a shape that ends, the other side of it is farther away than this.
          associate (wall => self%faces%wall)
-            if (.not. wall_is_solid(wall) .and. from%distance < -0.5_wp*wall%extent) &
+            if (.not. wall_is_solid(wall) .and. from%distance < -0.5_wp*wall%extent) then
                state = gap_state_t(size=self%size(i))
+            end if
          end associate
       end associate
    end subroutine measure_vertex

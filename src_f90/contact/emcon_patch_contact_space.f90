@@ -222,8 +222,9 @@ contains
       class(patch_contact_t), intent(in) :: self
 
       doubt = 0.0_wp
-      if (allocated(self%bulges)) &
+      if (allocated(self%bulges)) then
          doubt = bulges_doubt(self%bulges, self%sides%triangles%split)
+      end if
    end function patch_curve_doubt
 
    !> How much less than its patch has it the contact point of constraint `i` is in front of the

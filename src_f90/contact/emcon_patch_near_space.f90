@@ -407,8 +407,9 @@ contains
                if (patch_near_goes_on(near, sides, sides%triangles%beyond(k, triangle), x, &
                   u)) cycle
                associate (corner => sides%triangles%split%corner(:, triangle))
-                  if (is_shared(corner(k)) .or. is_shared(corner(1 + mod(k, 3)))) &
+                  if (is_shared(corner(k)) .or. is_shared(corner(1 + mod(k, 3)))) then
                      where (part == part(t)) fades = .true.
+                  end if
                end associate
             end associate
          end do

@@ -383,8 +383,9 @@ contains
       associate (place => cmplx(flat(1, :), flat(2, :), wp))
          moment = sum(place**4)
          axis = 1.0_wp
-         if (abs(moment) > round*sum(abs(place)**4)) &
+         if (abs(moment) > round*sum(abs(place)**4)) then
             axis = exp(cmplx(0.0_wp, 0.25_wp*atan2(aimag(moment), real(moment)), wp))
+         end if
       end associate
       turn = reshape([real(axis), -aimag(axis), aimag(axis), real(axis)], [2, 2])
    end function ring_axes

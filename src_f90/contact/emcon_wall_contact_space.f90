@@ -107,8 +107,9 @@ contains
       do i = 1, self%n_constraint
          associate (place => self%place(i))
             if (place > size(self%slave%node)) cycle
-            if (groups%node_start(place + 1) > groups%node_start(place) + 1) &
+            if (groups%node_start(place + 1) > groups%node_start(place) + 1) then
                self%own_slack(i) = corner_slack
+            end if
          end associate
       end do
    end subroutine hold_corners
@@ -217,11 +218,13 @@ contains
          state%is_arriving = .not. is_over(0)
          if (state%is_arriving) state%was_open = state%gap0 >= -max_penetration_on_entry*state%size
          if (self%slack > 0.0_wp) state%closed = -self%slack*state%size
-         if (allocated(self%own_slack) .and. .not. self%step%has_compliance) &
+         if (allocated(self%own_slack) .and. .not. self%step%has_compliance) then
             state%closed = -self%own_slack(i)*state%size
+         end if
          ! Behind a shape that ends, the other side of it is farther away than this.
-         if (.not. wall_is_solid(self%wall) .and. from%distance < -0.5_wp*self%wall%extent) &
+         if (.not. wall_is_solid(self%wall) .and. from%distance < -0.5_wp*self%wall%extent) then
             state = gap_state_t()
+         end if
       end associate
    end subroutine measure_node
 

@@ -110,8 +110,9 @@ contains
          associate (rigid => scene%rigid(i))
             if (any([(any(scene%element%node == rigid%node(k)), k = 1, size(rigid%node))])) cycle
             do k = 1, size(scene%step)
-               if (any(scene%step(k)%turn%rigid == i) .and. all([(prescribed_find( &
-                  scene%step(k)%prescribed, rigid%reference, a), a = 1, scene%n_dim)] > 0)) cycle
+               if (any(scene%step(k)%turn%rigid == i .and. scene%step(k)%turn%axis == 0) .and. &
+                  all([(prescribed_find(scene%step(k)%prescribed, rigid%reference, a), &
+                  a = 1, scene%n_dim)] > 0)) cycle
                call add_error(reader%log, rigid%origin, "rigid body " // rigid%name // " has no " &
                   // "elements, and so no mass: in step " // to_text(k) // " its reference node " &
                   // to_text(scene%node%label(rigid%reference)) // " is not prescribed in all " &

@@ -35,8 +35,9 @@ contains
          if (scene%tie(i)%slave == 0) cycle
          call check_common_nodes(reader, scene, scene%tie(i))
          call check_common_faces(reader, scene, i, tied)
-         if (reader%n_dim == n_space .and. reader%log%n_errors == 0) &
+         if (reader%n_dim == n_space .and. reader%log%n_errors == 0) then
             call check_order(reader, scene, scene%tie(i))
+         end if
       end do
       if (size(scene%pair) > 0) call check_contact(reader, scene)
    end subroutine check_ties

@@ -4,7 +4,6 @@ module emcon_deck_contact
    use emcon_deck_contact_settings, only : read_pair_initiation
    use emcon_deck_change_friction, only : read_friction_changes
    use emcon_deck_crossings, only : read_crossings
-   use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, &
       next_line
    use emcon_deck_friction, only : read_friction
@@ -170,11 +169,6 @@ contains
 
       formulation = option_default("formulation")
       if (option_name(card, "TYPE") == "") return
-      if (option_name(card, "TYPE") == "SURFACETOSURFACE" .and. reader%n_dim == n_space) then
-         call card_warning(reader, card, "TYPE=SURFACE TO SURFACE is computed by nodes in three " &
-            // "dimensions, as NODE TO SURFACE; TYPE=MORTAR integrates over faces")
-         return
-      end if
       formulation = option_code("formulation", option_name(card, "TYPE"))
       if (formulation > 0) then
          call check_option(reader, card, "TYPE", "formulation", formulation)

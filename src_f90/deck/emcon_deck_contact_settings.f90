@@ -35,7 +35,7 @@ contains
       call option_real(reader, card, "GAP TOLERANCE", step%contact%gap_tolerance)
       if (has_option(card, "GAPTOLERANCE") &
          .and. all(step%contact%initiation /= [initiation_auto, initiation_persistent])) then
-        call card_warning(reader, card, &
+         call card_warning(reader, card, &
             "GAP TOLERANCE has an effect with TYPE=AUTO and PERSISTENT only")
       end if
    end subroutine read_initiation
@@ -164,8 +164,9 @@ contains
          "either STABILIZE or RESET is to be given")
       if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
-      if (has_option(card, "STABILIZE") .or. has_option(card, "RESET")) &
+      if (has_option(card, "STABILIZE") .or. has_option(card, "RESET")) then
          step%stabilizes = has_option(card, "STABILIZE")
+      end if
    end subroutine read_controls
 
    !> Cards after `i_first` that the procedure of the step, or its duration, does not allow.

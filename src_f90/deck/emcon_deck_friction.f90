@@ -102,9 +102,10 @@ contains
       type(contact_pair_t), intent(in) :: pair
 
       associate (surface => pair%interaction)
-         if (surface%pressure%kind == pressure_hard .and. surface%stick > 0.0_wp) &
+         if (surface%pressure%kind == pressure_hard .and. surface%stick > 0.0_wp) then
             call add_warning(reader%log, pair%origin, "*CONTACT PAIR: the slope of stick of its " &
             // "*FRICTION has no effect: contact is hard, and what sticks does not move")
+         end if
       end associate
    end subroutine check_stick
 

@@ -53,8 +53,9 @@ contains
          end associate
       end do
       do i = 1, size(reader%card)
-         if (reader%card(i)%name == "CONTACTPROPERTYASSIGNMENT") &
+         if (reader%card(i)%name == "CONTACTPROPERTYASSIGNMENT") then
             call read_properties(reader, reader%card(i), scene)
+         end if
       end do
       if (i_contact > 0 .and. n == 0) call card_error(reader, reader%card(i_contact), "nothing " &
          // "is included; say what by *CONTACT INCLUSIONS, ALL EXTERIOR or by its data lines")
@@ -216,8 +217,9 @@ contains
       all = size(scene%surface)
       call append_pairs(scene, card, [all], formulation)
       do i = 1, all
-         if (scene%surface(i)%is_profile .or. allocated(scene%surface(i)%wall)) &
+         if (scene%surface(i)%is_profile .or. allocated(scene%surface(i)%wall)) then
             call append_pairs(scene, card, [all, i], formulation)
+         end if
       end do
    end subroutine include_exterior
 
@@ -257,8 +259,9 @@ contains
          call surface_nodes(scene, scene%surface(i), node)
          if (size(node) == 0) cycle
          do body = 1, size(scene%rigid)
-            if (any(scene%rigid(body)%node == node(1))) &
+            if (any(scene%rigid(body)%node == node(1))) then
                is_in(:, scene%rigid(body)%element) = .false.
+            end if
          end do
       end do
       associate (all => [(i, i = 0, size(is_in) - 1)], n => size(is_in, 1))

@@ -49,8 +49,9 @@ contains
       where (step(n + 1:)%contact%initiation == initiation_auto) &
          step(n + 1:)%contact%initiation = step(first)%contact%initiation
       call move_alloc(step, scene%step)
-      if (scene%step(first)%contact%initiation == initiation_massless) &
+      if (scene%step(first)%contact%initiation == initiation_massless) then
          call check_held(reader, scene, scene%step(n + 1)%origin, keeps)
+      end if
    end subroutine choose_initiation
 
    !> What has no mass by now cannot be held in further steps: it would get its mass back, and with

@@ -286,8 +286,7 @@ contains
       type(data_t) :: data
       type(load_t) :: new
       integer, allocatable :: item(:)
-      logical :: is_moment
-      integer :: i
+      integer :: freedom, i
 
       if (is_new(reader, card)) call drop_loads(self, by_node)
       new%origin = card%origin
@@ -296,54 +295,63 @@ contains
       do while (next_line(reader, data))
          call check_count(reader, data, 2, 3, "node or node set, degree of freedom, force")
          if (.not. data%ok) cycle
-         call get_integer(reader, data, 2, "degree of freedom", new%place)
+         call get_integer(reader, data, 2, "degree of freedom", freedom)
          new%value = 0.0_wp
          call get_real(reader, data, 3, "force", new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
-         if (data%ok) call check_force(reader, data, scene, item, new)
+         if (data%ok) call check_force(reader, data, scene, item, freedom, new%value)
          if (.not. data%ok) cycle
-         is_moment = new%place == last_freedom .and. scene%n_dim == n_plane
-         if (new%place > scene%n_dim .and. .not. is_moment) cycle
-         new%kind = merge(load_moment, load_point, is_moment)
-         if (is_moment) new%place = scene%n_dim + 1
          do i = 1, size(item)
-            if (is_moment .and. .not. any(scene%rigid%reference == item(i))) cycle
-            new%target = item(i)
-            call put_load(self, new)
+            call find_load(scene, item(i), freedom, new)
+            if (new%target > 0) call put_load(self, new)
          end do
       end do
    end subroutine read_cload
 
-   !> Forces act along the axes of the plane, moments on reference nodes of rigid bodies.
-   subroutine check_force(reader, data, scene, item, new)
+   !> What acts where a line says: a force on a node; a moment on the reference node of a rigid
+   !> body, by its own rotations or as a force on the ROT NODE; or nothing.
+   pure subroutine find_load(scene, node, freedom, load)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: node
+      integer, intent(in) :: freedom               !! 1..last_freedom
+      type(load_t), intent(inout) :: load          !! `target` 0: nothing
+      integer :: b, turn
+
+      b = findloc(scene%rigid%turning, node, 1)
+      turn = freedom - (last_freedom - n_turn(scene%n_dim))
+      if (b > 0) turn = freedom
+      load%kind = merge(load_moment, load_point, b > 0 .or. turn > 0)
+      load%place = merge(scene%n_dim + turn, freedom, load%kind == load_moment)
+      load%target = node
+      if (b > 0) load%target = scene%rigid(b)%reference
+      if (b == 0 .and. turn > 0 .and. .not. any(scene%rigid%reference == node)) load%target = 0
+      if (turn > n_turn(scene%n_dim) .or. (turn <= 0 .and. freedom > scene%n_dim)) load%target = 0
+   end subroutine find_load
+
+   !> Forces act along the axes of the model, moments on reference nodes of rigid bodies.
+   subroutine check_force(reader, data, scene, item, freedom, value)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: item(:)               !! nodes
-      type(load_t), intent(in) :: new
+      integer, intent(in) :: freedom               !! as the line has it
+      real(wp), intent(in) :: value                !! of the force or the moment
       integer :: i
 
-      if (new%value == 0.0_wp .and. new%place <= last_freedom) return
-      if (new%place == last_freedom .and. scene%n_dim == n_plane) then
-         do i = 1, size(item)
-            if (reader%doubt%rigid .or. any(scene%rigid%reference == item(i))) cycle
-            call data_error(reader, data, "no moment can act on node " // &
-               to_text(scene%node%label(item(i))) // ": degree of freedom 6 is that of the " // &
-               "reference node of a *RIGID BODY")
-            return
-         end do
-      else if (new%place > scene%n_dim) then
-         call data_error(reader, data, "degree of freedom " // to_text(new%place) &
+      if (freedom > 0 .and. freedom <= merge(scene%n_dim, last_freedom, abs(value) > 0.0_wp)) return
+      if (freedom > last_freedom .or. freedom <= last_freedom - n_turn(scene%n_dim)) then
+         call data_error(reader, data, "degree of freedom " // to_text(freedom) &
             // " does not exist; known: " // freedoms_text(scene%n_dim))
-      else
-         do i = 1, size(item)
-            if (.not. any(scene%rigid%turning == item(i))) cycle
-            call data_error(reader, data, "node " // to_text(scene%node%label(item(i))) // &
-               " is the ROT NODE of a rigid body: in three dimensions no moments act on rigid " &
-               // "bodies; prescribe the rotation by *BOUNDARY, or let forces act")
-            return
-         end do
+         return
       end if
+      do i = 1, size(item)
+         if (reader%doubt%rigid .or. any(scene%rigid%reference == item(i))) cycle
+         call data_error(reader, data, "no moment can act on node " &
+            // to_text(scene%node%label(item(i))) // ": degree" // trim(merge( &
+            " of freedom 6 is that  ", "s of freedom 4 to 6 are", scene%n_dim == n_plane)) // &
+            " of the reference node of a *RIGID BODY")
+         return
+      end do
    end subroutine check_force
 
 end module emcon_deck_loads

@@ -447,8 +447,9 @@ contains
          if (name == "") return
          new%set = name_index_find(index_of, name)
          is_empty = .false.
-         if (new%set > 0 .and. any(new%kind == [output_node_print, output_element_print])) &
+         if (new%set > 0 .and. any(new%kind == [output_node_print, output_element_print])) then
             is_empty = size(set(new%set)%item) == 0
+         end if
          if (is_empty .and. .not. (reader%doubt%nodes .or. reader%doubt%elements)) call &
             card_warning(reader, card, "the set " // quoted(name) // " is empty: nothing will be " &
             // "written")

@@ -81,8 +81,9 @@ contains
          case ("ASSEMBLY")
             self%in_assembly = .true.
          case ("ENDPART", "ENDINSTANCE", "ENDASSEMBLY")
-            if (self%is_sound .and. .not. (self%in_assembly .and. card%name == "ENDASSEMBLY")) &
+            if (self%is_sound .and. .not. (self%in_assembly .and. card%name == "ENDASSEMBLY")) then
                call add_error(log, origin_of(source, card%line), card%title // " ends nothing")
+            end if
             self%in_assembly = self%in_assembly .and. card%name /= "ENDASSEMBLY"
          case default
             call put_own(source, card, self, log)

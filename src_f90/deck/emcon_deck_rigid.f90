@@ -1,23 +1,20 @@
-!> *RIGID BODY: elements and nodes that keep their shape, their reference nodes, how these turn.
+!> *RIGID BODY: elements and nodes that keep their shape, and their reference nodes.
 module emcon_deck_rigid
    use emcon_deck_dimension, only : n_plane
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t
    use emcon_deck_surfaces, only : surface_names
-   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
-   use emcon_kinds, only : wp
+   use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_name_index, only : name_index_find
    use emcon_origin, only : origin_t
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
-   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
-   use emcon_steps, only : prescribed_find, prescribed_t
    use emcon_text, only : read_integer, to_text
    implicit none
    private
-   public :: read_rigid_bodies, read_turns, mark_rigid
+   public :: read_rigid_bodies, mark_rigid
 
 contains
 
@@ -260,112 +257,5 @@ contains
          body(scene%rigid(b)%node) = b
       end do
    end subroutine mark_rigid
-
-   !> What turns: with its reference node prescribed, a body is prescribed by its frame, else by
-   !> nodes of their own that its arms follow.
-   subroutine read_turns(reader, scene)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(inout) :: scene
-      integer :: i_step, i, a
-
-      do i_step = 1, size(scene%step)
-         do i = 1, size(scene%step(i_step)%turn)
-            associate (turn => scene%step(i_step)%turn(i))
-               turn%rigid = findloc(scene%rigid%reference, turn%angle(1)%node, 1)
-               if (turn%rigid == 0) cycle
-               turn%is_about = all([(prescribed_find(scene%step(i_step)%prescribed, &
-                  turn%angle(1)%node, a), a = 1, scene%n_dim)] > 0)
-               if (.not. turn%is_about) call add_arms(scene, turn%angle(1)%origin, turn%rigid)
-               call prescribe_turn(scene, i_step, i)
-            end associate
-            if (scene%n_dim /= n_plane) call check_turn(reader, scene, i_step, i)
-         end do
-      end do
-   end subroutine read_turns
-
-   !> In space a body turns about all axes as it is told, or about none. One that has turned freely
-   !> is held as it is, by FIXED: rotations are those from the start.
-   subroutine check_turn(reader, scene, i_step, i)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: i_step, i             !! turn `i` of that step
-      integer :: k
-
-      associate (turn => scene%step(i_step)%turn(i))
-         if (size(turn%angle) < n_turn(scene%n_dim) .or. (any(turn%angle%is_frozen) .and. &
-            .not. all(turn%angle%is_frozen))) call add_error(reader%log, turn%angle(1)%origin, &
-            "*BOUNDARY: reference node " // to_text(scene%node%label(turn%angle(1)%node)) // &
-            ": in three dimensions degrees of freedom 4 to 6 of a rigid body are all prescribed, " &
-            // "or all FIXED, or none; supports of single axes are not in this version")
-         if (all(turn%angle%is_frozen) .or. i_step == 1) return
-         associate (earlier => scene%step(i_step - 1)%turn)
-            k = findloc(earlier%rigid, turn%rigid, 1)
-            if (k > 0) then
-               if (.not. any(earlier(k)%angle%is_frozen)) return
-            end if
-         end associate
-         call add_error(reader%log, turn%angle(1)%origin, "*BOUNDARY: rigid body " // &
-            scene%rigid(turn%rigid)%name // " may have turned before step " &
-            // to_text(i_step) // ": in three dimensions FIXED holds it as it is then")
-      end associate
-   end subroutine check_turn
-
-   !> Nodes at the ends of the arms of rigid body `b`, behind all others, if it has none.
-   subroutine add_arms(scene, origin, b)
-      type(scene_t), intent(inout) :: scene
-      type(origin_t), intent(in) :: origin
-      integer, intent(in) :: b
-      integer :: k, n_dim, n
-
-      if (allocated(scene%rigid(b)%arm)) return
-      n_dim = scene%n_dim
-      n = size(scene%node%label)
-      associate (rigid => scene%rigid(b), last => maxval([0, scene%node%label]))
-         rigid%arm = [(n + k, k = 1, n_dim)]
-         scene%node%label = [scene%node%label, [(last + k, k = 1, n_dim)]]
-         scene%node%origin = [scene%node%origin, [(origin, k = 1, n_dim)]]
-         scene%x = reshape([scene%x, scene%x(:, rigid%frame(2:))], [n_dim, n + n_dim])
-         call lengthen(scene%u0)
-         call lengthen(scene%v0)
-      end associate
-
-   contains
-
-      subroutine lengthen(field)
-         real(wp), allocatable, intent(inout) :: field(:, :)    !! (n_dim, n_node)
-
-         associate (frame => scene%rigid(b)%frame)
-            field = reshape([field, field(:, frame(2:)) - spread(field(:, frame(1)), 2, n_dim)], &
-               [n_dim, n + n_dim])
-         end associate
-      end subroutine lengthen
-
-   end subroutine add_arms
-
-   !> Prescribe the nodes of the frame of turn `i` but the reference node, which is; or the arms.
-   pure subroutine prescribe_turn(scene, i_step, i)
-      type(scene_t), intent(inout) :: scene
-      integer, intent(in) :: i_step, i
-      type(prescribed_t) :: new(scene%n_dim**2)
-      integer :: k, a, n
-
-      associate (turn => scene%step(i_step)%turn(i))
-         n = 0
-         do k = 1, scene%n_dim
-            do a = 1, scene%n_dim
-               n = n + 1
-               new(n)%origin = turn%angle(1)%origin
-               if (turn%is_about) then
-                  new(n)%node = scene%rigid(turn%rigid)%frame(k + 1)
-               else
-                  new(n)%node = scene%rigid(turn%rigid)%arm(k)
-               end if
-               new(n)%dof = a
-               new(n)%turn = i
-            end do
-         end do
-      end associate
-      scene%step(i_step)%prescribed = [scene%step(i_step)%prescribed, new]
-   end subroutine prescribe_turn
 
 end module emcon_deck_rigid

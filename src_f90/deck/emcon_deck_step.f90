@@ -22,7 +22,7 @@ module emcon_deck_step
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
-   use emcon_deck_rigid, only : read_turns
+   use emcon_deck_turns, only : read_turns
    use emcon_deck_scheme, only : check_schemes, read_scheme
    use emcon_deck_pressure, only : soften_steps
    use emcon_deck_penalty, only : check_penalty, read_constraint_method

@@ -95,11 +95,13 @@ contains
 
       path = stripped(typed, " " // achar(9))
       if (len(path) > 1) then
-         if (scan(path(1:1), """'") == 1 .and. path(1:1) == path(len(path):)) &
+         if (scan(path(1:1), """'") == 1 .and. path(1:1) == path(len(path):)) then
             path = path(2:len(path) - 1)
+         end if
       end if
-      if (index(path, "/") /= 1 .and. .not. is_memory .and. path /= "") &
+      if (index(path, "/") /= 1 .and. .not. is_memory .and. path /= "") then
          path = file(:index(file, "/", back=.true.)) // path
+      end if
    end subroutine find_beside
 
    !> The nine coordinates of each facet, to all their digits.

@@ -91,9 +91,10 @@ contains
       call choose_option(reader, card, "MULTIPLIER", "tie multiplier", tie%multiplier)
       call option_word(reader, card, "ADJUST", "YES, NO", word)
       tie%is_adjusted = word /= "NO"
-      if (.not. tie%is_adjusted .and. (has_option(card, "TRANSLATION") .or. is_cyclic(card))) &
+      if (.not. tie%is_adjusted .and. (has_option(card, "TRANSLATION") .or. is_cyclic(card))) then
          call card_error(reader, card, "ADJUST=NO is for surfaces that meet as they are: with " // &
          "TRANSLATION and CYCLIC SYMMETRY slave nodes are moved")
+      end if
       call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
          "ties are integrated over faces, so that a uniform stress passes through")
       call option_word(reader, card, "CYCLIC SYMMETRY", "YES, NO", word)
@@ -213,8 +214,9 @@ contains
       if (reader%n_dim /= n_space .or. tie%slave == tie%master) return
       if (.not. has_nodes(scene%surface(tie%master))) return
       call take_faces(reader, data, scene, .false., tie%master)
-      if (has_nodes(scene%surface(tie%slave)) .and. .not. has_nodes(scene%surface(tie%master))) &
+      if (has_nodes(scene%surface(tie%slave)) .and. .not. has_nodes(scene%surface(tie%master))) then
          call take_faces(reader, data, scene, .true., tie%slave)
+      end if
    end subroutine find_faces
 
    !> The surface that the nodes of surface `i` make up in its place, if there is one.

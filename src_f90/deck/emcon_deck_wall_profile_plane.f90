@@ -125,8 +125,9 @@ contains
          associate (p => piece(k))
             least = min(p%from(1), p%to(1))
             ! An arc may go farther than its ends.
-            if (abs(p%bulge) > 0.0_wp .and. p%along(1) < 0.0_wp .and. p%leaves(1) > 0.0_wp) &
+            if (abs(p%bulge) > 0.0_wp .and. p%along(1) < 0.0_wp .and. p%leaves(1) > 0.0_wp) then
                least = min(least, p%centre(1) - p%radius)
+            end if
             if (least < -noise) call card_error(reader, card, "the profile has radii below 0, " &
                // to_text(least) // " in its part number " // to_text(k))
          end associate

@@ -64,8 +64,9 @@ contains
       end do
       do i = 1, n
          if (fillet(1 + mod(i + n - 2, n))%is_there .or. fillet(i)%is_there) then
-            if (left_of(side(i), fillet(1 + mod(i + n - 2, n)), fillet(i)) < -rounding) &
+            if (left_of(side(i), fillet(1 + mod(i + n - 2, n)), fillet(i)) < -rounding) then
                corner = i + 1
+            end if
          end if
       end do
       if (corner == 0) call lay(segment, side, fillet)

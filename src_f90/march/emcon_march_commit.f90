@@ -291,8 +291,9 @@ contains
          if (is_spring) then
             drag = item%response%tau - contact_laws_drag(self%active%set%law(k))
             contacts%slides_along(:, id) = 0.0_wp
-            if (constraints_dissipated(self%active%set, k, loss_friction) > 0.0_wp) &
+            if (constraints_dissipated(self%active%set, k, loss_friction) > 0.0_wp) then
                contacts%slides_along(:, id) = drag(:n)/max(norm2(drag), tiny(drag))
+            end if
          else
             if (.not. self%active%friction%law(id)%mu > 0.0_wp) return
             contacts%slides_along(:, id) = self%active%friction%law(id)%status%direction(:n)

@@ -209,9 +209,11 @@ contains
                - 2.0_wp/impacts%h*item%slip(s)
             problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_to_stop(s)
          end do
-         if (problem%n_slip > 1 .and. (law%holds_slip() .or. any(abs(law%slip_to_stop) > 0.0_wp))) &
+         if (problem%n_slip > 1 .and. (law%holds_slip() &
+            .or. any(abs(law%slip_to_stop) > 0.0_wp))) then
             problem%slip_target(:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k) &
             - problem%free(1:, k)
+         end if
       end associate
    end subroutine find_rubbing
 

@@ -239,8 +239,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
       class(start_gaps_t), allocatable :: contact
 
-      if (measured%surface(is_slave)%n_facet == 0 .or. measured%surface(is_master)%n_facet == 0) &
+      if (measured%surface(is_slave)%n_facet == 0 &
+         .or. measured%surface(is_master)%n_facet == 0) then
          return
+      end if
       call new_start_gaps(scene, reversed(pair), contact, error)
       if (allocated(error)) return
       call check_sides(scene, reversed(pair), contact, noise, "slave", error)

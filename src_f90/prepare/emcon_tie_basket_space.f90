@@ -52,8 +52,9 @@ contains
             if (slave%part(k) == p) is_part(pack(slave%corner(:, k), slave%corner(:, k) > 0)) &
                = .true.
          end do
-         if (span_a_plane(x(:, pack(slave%node, is_part .and. is_kept .and. .not. is_free)))) &
+         if (span_a_plane(x(:, pack(slave%node, is_part .and. is_kept .and. .not. is_free)))) then
             is_kept = is_kept .and. .not. (is_part .and. is_free)
+         end if
       end do
    end subroutine tie_basket_release
 
@@ -93,8 +94,9 @@ contains
          associate (mates => slave%facet(:, slave%around(i)))
             do m = 1, size(mates)
                if (mates(m) == 0) cycle
-               if (any(is_held(:, slave%node(k)) .and. .not. is_held(:, mates(m)))) &
+               if (any(is_held(:, slave%node(k)) .and. .not. is_held(:, mates(m)))) then
                   is_held_alone = .true.
+               end if
             end do
          end associate
       end do

@@ -147,8 +147,10 @@ contains
                if (all(abs(move(:, node)) <= 0.0_wp)) cycle
                call find_corners(kind, scene%x(:, node), before(:n))
                call find_corners(kind, scene%x(:, node) + move(:, node), after(:n))
-               if (.not. any(before(:n) > 0.0_wp .and. .not. after(:n) > least_area*before(:n))) &
+               if (.not. any(before(:n) > 0.0_wp &
+                  .and. .not. after(:n) > least_area*before(:n))) then
                   cycle
+               end if
                k = maxloc(sum(abs(move(:, node)), 1), 1)
                call tie_text(scene, node(k), tie)
                call raise(error, err_input, tie // "element " // &

@@ -58,8 +58,9 @@ contains
             call closing_text(digits)
             line = line // "the energy balance "
             ! Works of static steps are taken as if forces rose linearly, and are not judged.
-            if (energy%largest_error > bar .and. .not. energy%shown_error > bar) &
+            if (energy%largest_error > bar .and. .not. energy%shown_error > bar) then
                line = line // "of the dynamic steps "
+            end if
             line = line // "closes to " // digits // " digits or better, "
          end if
          if (energy%shown_error > bar) line = line &
@@ -202,10 +203,11 @@ contains
             to_text(check%n_facet) // trim(merge(" edges", " faces", size(check%low, 1) < 3)) // &
             "; deepest penetration " // &
             to_text(self%overlap%deepest, 3) // " of an element")
-         if (self%overlap%of_facets > max(touching_bar, self%overlap%deepest)) &
+         if (self%overlap%of_facets > max(touching_bar, self%overlap%deepest)) then
             call note_add(lines, "straight edges of curved surfaces overlap by up to " // &
             to_text(self%overlap%of_facets, 3) // " of their length, the curves through their " // &
             "nodes do not")
+         end if
       end associate
    end subroutine add_checked
 

@@ -51,8 +51,9 @@ module emcon_steps
    !> The rotation of a rigid body that is prescribed.
    type :: turn_t
       integer :: rigid = 0                           !! index into `scene_t%rigid`
-      !> (n_turn) of the reference node, values in radians; in space those of a rotation vector
+      !> (n_turn, or two) of the reference node, in radians; in space of a rotation vector
       type(prescribed_t), allocatable :: angle(:)
+      integer :: axis = 0                            !! of space that it may turn about; 0: none
       !> That node is prescribed too, in all directions
       logical :: is_about = .true.
    end type turn_t

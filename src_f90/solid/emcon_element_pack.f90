@@ -143,8 +143,9 @@ contains
       if (.not. allocated(motion%from)) allocate(motion%from(n_lane, n_dim, n_most), &
          motion%by(n_lane, n_dim, n_most), response%force(n_lane, n_dim, n_most), &
          response%magnitude(n_lane, n_dim, n_most))
-      if (with_tangent .and. .not. allocated(response%tangent)) &
+      if (with_tangent .and. .not. allocated(response%tangent)) then
          allocate(response%tangent(n_lane, n_dim, n_most, n_dim, n_most))
+      end if
    end subroutine pack_make_room
 
    !> The motion of the nodes of each element.

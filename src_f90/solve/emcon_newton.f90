@@ -311,8 +311,9 @@ contains
       self%looks_early = .false.
       left = huge(left)
       ! Where something rubs sets change in most steps.
-      if (self%convergence%is_kept .and. any(set%item(:set%n)%has_friction)) &
+      if (self%convergence%is_kept .and. any(set%item(:set%n)%has_friction)) then
          left = maxval(abs(self%dq))
+      end if
       call predicts_new_set(system, set, motion, left, changes)
       if (changes) status = newton_early
    end subroutine look
@@ -507,8 +508,9 @@ contains
 
       call newton_pick_residual(self, system, set)
       call phase_enter(system%phases, phase_eliminate, left)
-      if (self%correction%uses_null_space .or. self%convergence%is_kept) &
+      if (self%correction%uses_null_space .or. self%convergence%is_kept) then
          call correction_multipliers(self%correction, system, set, self%residual)
+      end if
       call constraints_take_hold(set)
       call phase_leave(system%phases, left)
       call newton_measure_forces(self, system, set, motion)

@@ -46,8 +46,9 @@ contains
             associate (contact => system%contact(pair)%contact)
                slip = 0.0_wp
                slip(:friction%n_slip) = contact%slip(i, motion%x, motion%u0, motion%du)
-               if (norm2(slip - friction%law(id)%slip_target) > has_way*contact%state(i)%size) &
+               if (norm2(slip - friction%law(id)%slip_target) > has_way*contact%state(i)%size) then
                   call friction_close(friction, system, pair, i, motion, 0.0_wp, .false.)
+               end if
             end associate
          end do
       end associate
@@ -137,20 +138,21 @@ contains
    pure subroutine host_friction_turn_few(active, before)
       type(active_set_t), intent(inout) :: active
       type(slip_status_t), intent(in) :: before(:)         !! (n_constraint) how they held there
-      real(wp) :: use(active%set%n), tau(most_slips)
+      real(wp) :: used(active%set%n), tau(most_slips)
       integer :: k
 
-      use = 0.0_wp
+      used = 0.0_wp
       do k = active%set%n_permanent + 1, active%set%n
          associate (law => active%friction%law(active%set%id(k)), &
                was => before(active%set%id(k)))
             if (law%status%kind /= contact_slides .or. was%kind == contact_slides) cycle
-            call friction_use(active%friction, active%set, k, tau(:active%friction%n_slip), use(k))
+            call friction_use(active%friction, active%set, k, tau(:active%friction%n_slip), used(k))
          end associate
       end do
       do k = active%set%n_permanent + 1, active%set%n
-         if (use(k) > 0.0_wp .and. use(k) < alike*maxval(use)) &
+         if (used(k) > 0.0_wp .and. used(k) < alike*maxval(used)) then
             active%friction%law(active%set%id(k))%status = before(active%set%id(k))
+         end if
       end do
    end subroutine host_friction_turn_few
 

@@ -164,8 +164,9 @@ contains
                if (active%is_active(id)) then
                   k = k + 1
                   changes = contact%state(i)%is_leaving
-                  if (.not. (self%is_problem .and. .not. active%set%lam(k) > 0.0_wp)) &
+                  if (.not. (self%is_problem .and. .not. active%set%lam(k) > 0.0_wp)) then
                      call look_at_active(active, contact, i, k, motion, status)
+                  end if
                   if (.not. self%is_problem) changes = changes .or. .not. (self%only_adds .or. &
                      active%set%lam(k) >= -noise_at(active, system, contact%node(i)))
                else

@@ -117,9 +117,8 @@ contains
          if (.not. is_of_quadratic(point(i))) cycle
          if (any(point(max(1, i - 1):i - 1) == point(i))) cycle
          ! With several, those of other sides keep theirs.
-         if (any(point(i + 1:min(i + 1, size(point))) == point(i)) .and. on(point(i)) > 0.0_wp) &
-            cycle
-         pressure(i) = mean(point(i))
+         if (.not. (any(point(i + 1:min(i + 1, size(point))) == point(i)) &
+            .and. on(point(i)) > 0.0_wp)) pressure(i) = mean(point(i))
       end do
 
    contains

@@ -125,8 +125,10 @@ contains
          call box_tree_find(tree, bottom, top, offset, found, n)
          do k = 1, n
             associate (vertex => other%split%corner(:, found(k)))
-               if (any(other%facets%facet(:, other%split%facet(found(k))) == one%facets%node(i))) &
+               if (any(other%facets%facet(:, other%split%facet(found(k))) &
+                  == one%facets%node(i))) then
                   cycle
+               end if
                call pass(one%at(:, i), one%way(:, i), lifted(other%at(:, vertex), offset), &
                   other%way(:, vertex), min(first, span), first)
             end associate

@@ -70,7 +70,7 @@ contains
 
       do k = 1, size(scene%step(i)%turn)
          associate (turn => scene%step(i)%turn(k))
-            if (.not. all(prescribed_rests(turn%angle))) cycle
+            if (turn%axis > 0 .or. .not. all(prescribed_rests(turn%angle))) cycle
             associate (body => scene%rigid(turn%rigid))
                if (all(now(:, body%reference))) now(:, body%node) = .true.
             end associate

@@ -207,8 +207,9 @@ contains
          else if (depth <= pad) then
             depth = 0.0_wp
          else if (.not. b%is_closed) then
-            if (all(b%is_rim(b%split%corner(:, nearest%triangle)) .or. weight <= 0.0_wp)) &
+            if (all(b%is_rim(b%split%corner(:, nearest%triangle)) .or. weight <= 0.0_wp)) then
                depth = 0.0_wp
+            end if
          end if
       end associate
    end function depth_of

@@ -56,8 +56,9 @@ contains
       self%n_class = max(1, min(n_body, most_classes))
       allocate(has_rim(facets%n_facet), source=.false.)
       do f = 1, facets%n_facet
-         if (any(facets%neighbour(:, f) == 0 .and. facets%facet(:, f) > 0)) &
+         if (any(facets%neighbour(:, f) == 0 .and. facets%facet(:, f) > 0)) then
             has_rim(facets%part(f)) = .true.
+         end if
       end do
       self%is_closed = .not. has_rim(facets%part)
       allocate(still, mold=scene%x)
@@ -125,8 +126,9 @@ contains
       integer, intent(in) :: own, f              !! 1 to n_facet
 
       meet = .true.
-      if (self%is_self .and. self%body(own) == self%body(f)) &
+      if (self%is_self .and. self%body(own) == self%body(f)) then
          meet = may_facets_touch(self, facets, own, f)
+      end if
    end function touch_rule_space_meet
 
    !> May a point of facet `own` of a body touch facet `f` of it?

@@ -10,6 +10,7 @@ module emcon_loads
    use emcon_element_registry, only : face_shape_create
    use emcon_element_space, only : n_space
    use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
+   use emcon_moment_load_space, only : push_frame, push_frame_stiffness
    use emcon_pressure_plane, only : add_pressure, add_pressure_stiffness
    use emcon_pressure_ring_plane, only : press_ring, press_ring_stiffness
    use emcon_pressure_space, only : press_face, press_face_stiffness
@@ -56,9 +57,14 @@ module emcon_loads
       procedure :: is_symmetric
    end type loads_t
 
-   integer, parameter :: moment_nodes = 2
-
 contains
+
+   !> Nodes of a frame that a moment acts on: two in the plane, all four in space.
+   pure integer function moment_nodes(n_dim)
+      integer, intent(in) :: n_dim
+
+      moment_nodes = n_dim + merge(1, 0, n_dim == n_space)
+   end function moment_nodes
 
    !> Loads on the elements of `solid` and their nodes; there are none before the first step.
    subroutine loads_init(self, scene, solid)
@@ -144,8 +150,8 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not needed: they are found again
       integer, allocatable :: number(:), all(:)
-      integer :: dof(scene%n_dim, maxval([moment_nodes, scene%element%kinds%n_face_node])), i, j, &
-         k, a
+      integer :: dof(scene%n_dim, maxval([moment_nodes(scene%n_dim), &
+         scene%element%kinds%n_face_node])), i, j, k, a
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
@@ -183,7 +189,7 @@ contains
       is_on_some = self%load%kind == load_pressure .or. self%load%kind == load_moment
       n = count(is_on_some)
       if (allocated(self%face)) deallocate(self%face, self%n_on, self%slot)
-      associate (most => maxval([moment_nodes, scene%element%kinds%n_face_node]))
+      associate (most => maxval([moment_nodes(scene%n_dim), scene%element%kinds%n_face_node]))
          allocate(self%face(most, n), self%n_on(n), source=0)
          allocate(self%slot(scene%n_dim*most, scene%n_dim*most, n), source=0)
       end associate
@@ -193,7 +199,7 @@ contains
          e = self%load(i)%target
          associate (n_on => self%n_on(self%at(i)), face => self%face(:, self%at(i)))
             if (self%load(i)%kind == load_moment) then
-               n_on = moment_nodes
+               n_on = moment_nodes(scene%n_dim)
                face(:n_on) = self%frame(:n_on, findloc(self%frame(1, :), e, 1))
             else
                associate (kind => scene%element%kinds(scene%element%kind(e)))
@@ -264,12 +270,7 @@ contains
                p = p*self%thickness(load%target)
                call respond_pressure(self, i, p, motion, value, side)
             case (load_moment)
-               associate (frame => self%face(:moment_nodes, self%at(i)))
-                  call add_moment(frame, p, motion%x, motion%at, self%force)
-                  if (present(value)) call add_moment_stiffness(motion%x(:, frame) &
-                     + motion%at(:, frame), p*motion%load_weight, self%slot(:, :, self%at(i)), &
-                     value, side)
-               end associate
+               call respond_moment(self, i, p, motion, value, side)
             end select
          end associate
       end do
@@ -336,6 +337,33 @@ contains
          end if
       end associate
    end subroutine respond_pressure
+
+   !> Moment `i` on the frame of its body.
+   subroutine respond_moment(self, i, p, motion, value, side)
+      class(loads_t), intent(inout) :: self
+      integer, intent(in) :: i                   !! load
+      real(wp), intent(in) :: p                  !! [M L^2/T^2]
+      type(motion_t), intent(in) :: motion       !! placed
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      real(wp) :: place(size(self%force, 1), self%n_on(self%at(i))), moment(size(self%force, 1))
+      integer :: m
+
+      associate (frame => self%face(:self%n_on(self%at(i)), self%at(i)), n_dim => size(moment))
+         place = motion%x(:, frame) + motion%at(:, frame)
+         m = size(place)
+         if (n_dim == n_space) then
+            moment = 0.0_wp
+            moment(self%load(i)%place - n_dim) = p
+            call push_frame(frame, moment, place, self%force)
+            if (present(value)) call push_frame_stiffness(place, moment*motion%load_weight, &
+               self%slot(:m, :m, self%at(i)), value, side)
+         else
+            call add_moment(frame, p, motion%x, motion%at, self%force)
+            if (present(value)) call add_moment_stiffness(place, p*motion%load_weight, &
+               self%slot(:m, :m, self%at(i)), value, side)
+         end if
+      end associate
+   end subroutine respond_moment
 
    !> It is, unless a pressure follows the surface, or there is a moment.
    pure logical function is_symmetric(self, motion)

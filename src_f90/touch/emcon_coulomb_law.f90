@@ -118,8 +118,9 @@ contains
       if (.not. self%turns .or. self%status%kind /= contact_slides) return
       rest = remainder_of(at%slip, self%slip_target)
       size = norm2(rest%over)
-      if (size <= has_way*at%size .or. dot_product(rest%over, self%status%direction) <= 0.0_wp) &
+      if (size <= has_way*at%size .or. dot_product(rest%over, self%status%direction) <= 0.0_wp) then
          return
+      end if
       direction = rest%over/size
       ! Below 0 where what is to be let go pulls.
       drag = sign(norm2(at%friction), dot_product(at%friction, self%status%direction))

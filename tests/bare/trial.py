@@ -1,4 +1,4 @@
-"""The first hour on a machine that has nothing: `sudo python3 tests/bare/trial.py WHEEL...`
+"""The first hour on a machine that has nothing: `sudo python3 tests/bare/trial.py [WHEEL...] [--source]`
 
 Bare folders of Debian 12 and Ubuntu 24.04 (debootstrap) with Python and without a compiler. In
 each: `pip install` of the wheel that fits its Python, the lines of README.md, the scenes that are
@@ -6,6 +6,9 @@ drawn in Gmsh from script to picture, in under two minutes each; then CMake and 
 host in C++ from the files of the wheel; with --prefix also from an installed one. Says seconds and
 those of the processor, by which the two minutes are judged where the machine is loaded with other
 work; ends with 1 where something fails.
+
+With --source: `make run` of a clone, by phases, in folders of their own, whose compilers stay there;
+where such a folder is new, system packages are installed too.
 
 It needs root, debootstrap, and a network; folders that are there already are used again.
 """
@@ -19,6 +22,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -131,6 +135,16 @@ def scenes(bare: Bare, wheel: Path) -> None:
         bare.run("  its picture", f"test -s {scene}/gmsh_{scene}.png")
 
 
+def source(bare: Bare) -> None:
+    """`make run` of a clone of what is committed, by phases."""
+    subprocess.run(["git", "clone", "-q", str(ROOT), str(bare.folder/"trial"/"emcon")], check=True)
+    bare.run("apt-get install make", "apt-get update -q && apt-get install -qy --no-install-recommends make")
+    for what, command in (("system packages", ".ci/setup system"), ("program", "make -j$(nproc) app"),
+                          ("Python packages", ".ci/setup python run"), ("Python extension", "make -j$(nproc) pywrap"),
+                          ("scene and picture", "make run && test -s build/run/ring.png")):
+        bare.run(f"make run: {what}", f"cd emcon && {command}")
+
+
 def hosts(bare: Bare, prefix: Path | None) -> None:
     """The host in C++ by CMake, from the wheel, and from an installed prefix."""
     shutil.copytree(ROOT/"tests"/"embed"/"cmake", bare.folder/"trial"/"host")
@@ -148,29 +162,41 @@ def hosts(bare: Bare, prefix: Path | None) -> None:
              " && cmake --build of_prefix --target host && of_prefix/host input_decks/ring.inp")
 
 
+def tried(bare: Bare, trial: Callable[[Bare], object]) -> list[str]:
+    """What of a trial failed."""
+    bare.folder.mkdir(parents=True, exist_ok=True)
+    try:
+        bare.set_up()
+        trial(bare)
+    finally:
+        bare.leave()
+    return [f"{bare.system.name}: {what}" for what in bare.failed]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("wheel", nargs="+", type=Path, metavar="WHEEL")
+    parser.add_argument("wheel", nargs="*", type=Path, metavar="WHEEL")
+    parser.add_argument("--source", action="store_true", help="time `make run` of a clone")
     parser.add_argument("--system", choices=SYSTEMS, nargs="+", default=list(SYSTEMS))
     parser.add_argument("--folder", type=Path, metavar="FOLDER", default=ROOT/"build"/"bare",
                         help="holds a folder for each system")
     parser.add_argument("--prefix", type=Path, metavar="FOLDER",
                         help="of `make install` on Debian 12, tried there too")
     options = parser.parse_args()
+    if not (options.wheel or options.source):
+        parser.error("give wheels, or --source")
     failed = []
     for system in (SYSTEMS[name] for name in options.system):
+        if options.source:
+            failed += tried(Bare(system, options.folder/f"{system.name}-source"), source)
+        if not options.wheel:
+            continue
         fitting = [wheel for wheel in options.wheel if f"-{system.python}-" in wheel.name]
         if not fitting:
             sys.exit(f"error: no wheel for {system.python}, the Python of {system.name}")
-        bare = Bare(system, options.folder/system.name)
-        bare.folder.mkdir(parents=True, exist_ok=True)
-        try:
-            bare.set_up()
-            scenes(bare, fitting[0])
-            hosts(bare, options.prefix if system.name == "debian" else None)
-        finally:
-            bare.leave()
-        failed += [f"{system.name}: {what}" for what in bare.failed]
+        prefix = options.prefix if system.name == "debian" else None
+        failed += tried(Bare(system, options.folder/system.name),
+                        lambda bare, wheel=fitting[0], prefix=prefix: (scenes(bare, wheel), hosts(bare, prefix)))
     print("all is well" if not failed else f"failed: {', '.join(failed)}")
     return 1 if failed else 0
 

@@ -284,7 +284,9 @@ def rows_of(case, found):
 
 
 def percent(part):
-    return f"{100*part:.2g} %" if part >= 1e-4 else "< 0.01 %"
+    if part < 1e-4:
+        return "< 0.01 %"
+    return f"{100*part:.0f} %" if part >= 0.1 else f"{100*part:.2g} %"
 
 
 # ---- the page -----------------------------------------------------------------------------------

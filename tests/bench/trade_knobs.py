@@ -138,9 +138,10 @@ def run_of(deck, folder, parameters, change):
     return (run if is_whole else None), done
 
 
-def last_words(errors, folder):
-    """What a program said last, without the folder it ran in."""
-    return errors.strip().splitlines()[-1].replace(str(folder), "")[:80]
+def stop_of(errors):
+    """When a run stopped, by what it said last."""
+    time = re.search(r"the analysis stops at time ([-+.0-9E]+)", errors)
+    return f"stops at time {float(time[1]):.3g}" if time else "is refused"
 
 
 def critical_step(deck, folder, parameters):
@@ -186,7 +187,7 @@ def lines_of(name, make, parameters, rounds):
             cost.setdefault(knob, []).append(done.cpu)
             if k == 0:
                 kept[knob] = figures_of(run, reference) if run else (
-                    "stops: " + last_words(done.errors, folder), "", "", "", "")
+                    stop_of(done.errors), "", "", "", "")
     first = min(cost["default"])
     return [(name, knob, f"{min(cost[knob])/first:.2f}", *found) for knob, found in kept.items()]
 

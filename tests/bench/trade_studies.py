@@ -200,6 +200,31 @@ def goals(jobs, names=GOALS):
     return [part for line in lines for part in line.split("\n")]
 
 
+def goal_table(lines):
+    """A row for each goal by what the reports of `goals` say."""
+    rows, told = [], []
+    for line in lines:
+        if line.startswith("goal "):
+            told.append(line)
+        elif told and line.startswith("    ") and not line.startswith("    --"):
+            told[-1] += " " + line.strip()
+    for text in told:
+        goal, words = text.removeprefix("goal ").split(": the cheapest setting is ", 1)
+        ratio, kind, own = re.search(r"([0-9.]+) times (cheaper|dearer) than the deck's own \((.*?)\);",
+                                     words).groups()
+        alone = [(name.split("=")[0], float(n)) for name, n, misses in re.findall(
+            r"(\w+=[^;:]*) alone: ([0-9.]+) times(, and the goal is not met)?", words)]
+        most = [f"{name} {n:g}" for name, n in sorted(alone, key=lambda one: -one[1]) if n > 1]
+        times, = re.search(r"for ([0-9.]+) times the time", words).groups()
+        meets = "alone the deck's own meets" in words
+        rows.append((goal, "misses it" if "the goal is not met" in own else "meets it",
+                     "meets it" if meets else "misses it with every h and mesh",
+                     f"{ratio} times {kind}", f"{'' if meets else 'more than '}{times} times cheaper",
+                     ", ".join(most)))
+    return table(["goal", "the deck's own setting", "its treatment, any h", "cheapest against the deck's own",
+                  "against its treatment", "one knob alone, times cheaper"], rows)
+
+
 # ---- what a fifth pays for ----------------------------------------------------------------------
 
 #: Decks of the goals as they are: name, deck, parameters, h, end.
@@ -389,6 +414,8 @@ def main():
         print(*lines, sep="\n", flush=True)
         if options.update:
             PAGE.write_text(update(PAGE.read_text(), name, lines))
+            if name == "goals":
+                PAGE.write_text(update(PAGE.read_text(), "goal table", goal_table(lines)))
 
 
 if __name__ == "__main__":

@@ -204,6 +204,30 @@ def test_conditions_at_many_nodes_take_a_value_for_each() -> None:
         assert stepper.u[3].tolist() == pytest.approx([0.025, 0.0], rel=1e-14)
 
 
+def test_a_section_of_all_of_a_mesh() -> None:
+    """Without a set it is for all elements, of every kind; a set of that name that the mesh has stands."""
+    mesh = block((0.0, 0.0), (2.0, 1.0), (2, 1), "A") + block((3.0, 0.0), (2.0, 1.0), (2, 1), "B", kind="CPE3")
+    assert len(mesh.elements) == 2
+    model = Model.from_mesh(mesh).material("M", elastic=(100.0, 0.3), density=2.0).section("M", thickness=0.5)
+    model.initial("VELOCITY", "ALL", 1, 3.0).step("DYNAMIC", 0.1, 0.1, nlgeom=True)
+    with model.stepper() as stepper:
+        assert stepper.momenta()["px"] == pytest.approx(3.0*2*2.0, rel=1e-14)
+    mesh.element_sets["ALL"] = mesh.element_sets["A"]
+    assert Model.from_mesh(mesh).deck().count("ELSET=ALL") == 1
+
+
+def test_a_moment_turns_a_body_of_space_by_calls() -> None:
+    """About the axle that two rotations at 0 leave: momentum by moment times time."""
+    wheel = Model.from_mesh(block((0.0, 0.0, 0.0), (1.0, 1.0, 2.0), (1, 1, 2), "W", kind="C3D8"))
+    wheel.material("M", density=1.0).section("M")
+    wheel.add_nodes([(0.5, 0.5, 1.0)], labels=[99])
+    wheel.rigid_body(None, 99, nodes="W").boundary(99, (1, 2, 3, 4, 5))
+    wheel.step("DYNAMIC", 0.1, 1.0, direct=True, nlgeom=True).load(99, 6, 0.7)
+    with wheel.stepper() as stepper:
+        stepper.run()
+        assert stepper.momenta()["lz"] == pytest.approx(0.7, rel=1e-12)
+
+
 def test_rigid_bodies_of_space_turn_by_calls() -> None:
     """A free top: spins in degrees of freedom 4 to 6, or about an axis; then it is turned, as prescribed."""
     mesh = block((0.0, 0.0, 0.0), (1.0, 1.0, 2.0), (1, 1, 2), "TOP", kind="C3D8")

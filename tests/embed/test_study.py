@@ -10,10 +10,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
+import matplotlib
 import numpy as np
 import pytest
 from emcon.mesh import block, disc, refine
+from emcon.plotting import WIDTH
 from emcon.results import Bodies, ResultPaths, read_bodies
+from emcon.scene import STYLE
 from emcon.study import StudyError
 from emcon.study.accuracy import (Limit, Run, common_nodes, difference, fitted_order, limit_of,
                                   observed_order)
@@ -193,6 +196,41 @@ def test_figures_mark_the_front_the_floor_and_the_goal() -> None:
     assert drawn["Pareto front"].get_xydata() == pytest.approx(np.array([[1.0, 0.04],
                                                                          [10.0, 0.01]]))
     assert list(drawn["goal"].get_ydata()) == [0.05, 0.05]
+
+
+@pytest.mark.parametrize("length", [1.8, 4.5, 7.9, 12.0, 49.0, 1e4])
+def test_numbers_of_figures_do_not_overlap(length: float) -> None:
+    """In a panel of its size, from any cost on."""
+    for cheapest in (0.107, 0.3, 0.9, 2.2):
+        costs = cheapest*length**np.linspace(0.0, 1.0, len(ERRORS))
+        errors = {name: (float(cost), error) for cost, (name, (_, error)) in zip(costs, ERRORS.items(), strict=True)}
+        check_numbers(study_of(errors, 0.02, "impulse:0.05"))
+
+
+def check_numbers(study: Study) -> None:
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH/3, 3.3))
+        axes = figure.subplots()
+        figure.subplots_adjust(left=0.8/(WIDTH/3), right=1 - 0.25/(WIDTH/3))
+        _draw_work(axes, study, study.references[0], "impulse")
+        figure.canvas.draw()
+        low, high = axes.get_xlim()
+        boxes = [label.get_window_extent() for tick, label in zip(axes.get_xticks(), axes.get_xticklabels())
+                 if low <= tick <= high]
+        boxes += [label.get_window_extent() for label in axes.get_xticklabels(minor=True) if label.get_text()]
+        assert len(boxes) >= 2
+        boxes.sort(key=lambda box: box.x0)
+        assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
+
+
+@pytest.mark.parametrize("tolerance", ["1e-6", "10"])
+def test_figures_reach_to_a_goal_far_from_all_errors(tolerance: str) -> None:
+    study = study_of(ERRORS, 0.02, f"impulse:{tolerance}")
+    axes = Figure().subplots()
+    _draw_work(axes, study, study.references[0], "impulse")
+    low, high = axes.get_ylim()
+    assert low < float(tolerance) < high
+    assert low < 0.01 and high > 0.04
 
 
 def test_the_price_may_leave_out_the_start() -> None:

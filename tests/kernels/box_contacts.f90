@@ -1,4 +1,5 @@
-!> Contact between two boxes in space, rough ones and steps of them, for tests of what conditions are made of.
+!> Contact between two boxes in space, rough ones and steps of them, for tests of what conditions
+!> are made of.
 module box_contacts
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t

@@ -5,7 +5,7 @@ module first_failure
    public :: failure_keep, failure_take
 
    !> Since it was last taken.
-   character(len=:), allocatable, save :: kept
+   character(len=:), allocatable :: kept
 
 contains
 

@@ -18,9 +18,10 @@ contains
       type(shape_surface_t), intent(out) :: self
       integer, intent(in) :: n
       real(wp), intent(in) :: radius
-      integer, parameter :: face(60) = [1, 12, 6, 1, 6, 2, 1, 2, 8, 1, 8, 11, 1, 11, 12, 2, 6, 10, 6, &
-         12, 5, 12, 11, 3, 11, 8, 7, 8, 2, 9, 4, 10, 5, 4, 5, 3, 4, 3, 7, 4, 7, 9, 4, 9, 10, 5, 10, &
-         6, 3, 5, 12, 7, 3, 11, 9, 7, 8, 10, 9, 2]
+      integer, parameter :: face(60) = [ &
+         1, 12, 6, 1, 6, 2, 1, 2, 8, 1, 8, 11, 1, 11, 12, 2, 6, 10, 6, 12, 5, &
+         12, 11, 3, 11, 8, 7, 8, 2, 9, 4, 10, 5, 4, 5, 3, 4, 3, 7, 4, 7, 9, &
+         4, 9, 10, 5, 10, 6, 3, 5, 12, 7, 3, 11, 9, 7, 8, 10, 9, 2]
       integer, allocatable :: finer(:, :)
       real(wp) :: a, b
       integer :: i, k, middle(3), m
@@ -45,7 +46,8 @@ contains
 
       !> Nodes in the middle of edges, found by a table of the edges of each lower node.
       subroutine refine()
-         integer :: first(size(self%x, 2)), next(3*size(self%facet, 2)), upper(size(next)), e, j, p, q
+         integer :: first(size(self%x, 2)), next(3*size(self%facet, 2)), upper(size(next)), e, j, &
+            p, q
          real(wp), allocatable :: x(:, :)
 
          first = 0
@@ -105,7 +107,8 @@ contains
                   at(c, :) = [j, j, j + 1, j + 1]
                   if (end == 0) at = at(:, 4:1:-1)
                   k = k + 1
-                  self%facet(:, k) = [node(at(:, 1)), node(at(:, 2)), node(at(:, 3)), node(at(:, 4))]
+                  self%facet(:, k) = [node(at(:, 1)), node(at(:, 2)), node(at(:, 3)), node(at(:, &
+                     4))]
                end do
             end do
          end do

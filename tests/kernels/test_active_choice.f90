@@ -458,7 +458,8 @@ contains
       end do
    end subroutine test_leave_out
 
-   !> Below the gap to act at, with half of an overclosure left, or that of the start if it is lower.
+   !> Below the gap to act at, with half of an overclosure left, or that of the start if it is
+   !> lower.
    subroutine test_closes(error)
       type(error_t), allocatable, intent(out) :: error
       type(open_t), allocatable :: row(:)
@@ -500,7 +501,8 @@ contains
          call candidates_look(active, system, motion, status, .true.)
          call check_true(error, active%candidates%one_closes .eqv. row(k)%closes, "closes " &
             // to_text(k))
-         call check_true(error, active%candidates%acts(3) .eqv. row(k)%closes, "acts " // to_text(k))
+         call check_true(error, active%candidates%acts(3) .eqv. row(k)%closes, "acts " &
+            // to_text(k))
       end do
    end subroutine test_closes
 
@@ -517,7 +519,8 @@ contains
 
       do k = 1, size(slip)
          call open_given_contact(system, active, motion, reshape([gap_state_t(is_near=.true., &
-            is_over=.true., gap0=0.3_wp, gap1=-0.1_wp, size=edge)], [1, 1]), 0, coulomb_t(mu=0.5_wp))
+            is_over=.true., gap0=0.3_wp, gap1=-0.1_wp, size=edge)], [1, 1]), 0, &
+            coulomb_t(mu=0.5_wp))
          contact => given_of(system, 1)
          contact%slid = slip(k)
          motion%evaluation = evaluation_at_end
@@ -559,7 +562,8 @@ contains
       logical :: is_marked(2), acts(2)
       integer :: k, i
 
-      call open_given_contact(system, active, motion, reshape([(gap_state_t(), i = 1, 2)], [1, 2]), &
+      call open_given_contact(system, active, motion, reshape([(gap_state_t(), i = 1, 2)], [1, &
+         2]), &
          0, coulomb_t(mu=0.5_wp))
       contacts%lam = [1.0_wp, 2.0_wp]
       contacts%closure = [-0.1_wp, -0.2_wp]

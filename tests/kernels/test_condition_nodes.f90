@@ -62,7 +62,8 @@ contains
    subroutine test_take_slip(error)
       type(error_t), allocatable, intent(out) :: error
       type(condition_t) :: item, over
-      integer, parameter :: before(3) = [7, 3, 9], after(4) = [7, 5, 3, 8], all_of(5) = [7, 5, 3, 8, 9]
+      integer, parameter :: before(3) = [7, 3, 9], after(4) = [7, 5, 3, 8], all_of(5) = [7, 5, 3, &
+         8, 9]
       real(wp) :: t1(3, 5, 2), g(3, 4), ht(12, 12, 2)
 
       call begin(over, before)
@@ -76,7 +77,8 @@ contains
       t1(:, [1, 3, 5], :) = over%t1
       call condition_take_slip(item, over)
       call check_equal(error, item%node(:item%n_node), all_of, "nodes")
-      call check_true(error, all(shape(item%t1) == [3, 5, 2]) .and. all(shape(item%t) == [3, 5, 2]) &
+      call check_true(error, all(shape(item%t1) == [3, 5, 2]) .and. all(shape(item%t) == [3, 5, &
+         2]) &
          .and. all(shape(item%ht) == [15, 15, 2]), "there is no room for all nodes")
       if (allocated(error)) return
       call check_true(error, all(abs(item%t1 - t1) <= 0.0_wp), "gradients are those of other nodes")

@@ -155,8 +155,8 @@ contains
       item%ht = rubbish
    end subroutine spoil
 
-   !> The gap changes by its discrete gradient times the way, slip is that of its own; differences of
-   !> both are their derivatives, and those of the gap at the end are the gradient there.
+   !> The gap changes by its discrete gradient times the way, slip is that of its own; differences
+   !> of both are their derivatives, and those of the gap at the end are the gradient there.
    subroutine test_derivatives(error)
       type(error_t), allocatable, intent(out) :: error
       type(case_t) :: case

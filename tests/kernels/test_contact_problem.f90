@@ -260,9 +260,10 @@ contains
       call check_true(error, n_path > 10, "by a path")
    end subroutine test_shares
 
-   !> Rigid bodies in a row, each on the one before by four corners, the first one on a floor: twelve
-   !> forces hold six motions. They come with velocities of all sizes, and some are led to a stop. By
-   !> the path alone, whose end no trial is near; forces are judged by the law of each contact.
+   !> Rigid bodies in a row, each on the one before by four corners, the first one on a floor:
+   !> twelve forces hold six motions. They come with velocities of all sizes, and some are led to a
+   !> stop. By the path alone, whose end no trial is near; forces are judged by the law of each
+   !> contact.
    subroutine test_row(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_body = 5, n = 4*n_body
@@ -450,7 +451,8 @@ contains
             + turn*spread(rows(:, 3), 2, 4)*spread(rows(:, 3), 1, 4)
          problem%mu = [0.4_wp, 1.0_wp]
          problem%slip_target(1, :) = -[1.0_wp, 1.0_wp + apart(k)]
-         problem%free = reshape([0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp] - matmul(problem%w, pushes), [2, 2])
+         problem%free = reshape([0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp] - matmul(problem%w, pushes), [2, &
+            2])
          force = 0.0_wp
          call contact_problem_solve(problem, force, effort, is_solved)
          call check_true(error, is_solved, "solved")
@@ -711,8 +713,9 @@ contains
       call check_alone(error, [0.0_wp, 2.0_wp], [1.0_wp, 0.0_wp])
    end subroutine test_alone
 
-   !> A rigid body rests on contacts under a load that some pushes at them balance, which is all that
-   !> is known of it: what is found balances the load, too, and obeys the law without any motion.
+   !> A rigid body rests on contacts under a load that some pushes at them balance, which is all
+   !> that is known of it: what is found balances the load, too, and obeys the law without any
+   !> motion.
    subroutine test_at_rest(error)
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
@@ -744,7 +747,8 @@ contains
          call check_true(error, is_solved, "case " // to_text(i))
          force = contact_problem_force(problem, push)
          associate (scale => maxval(abs(push)) + maxval(abs(load)))
-            call check_near(error, matmul(reshape(force, [size(force)]), rows), load, 1.0e6_wp*eps, &
+            call check_near(error, matmul(reshape(force, [size(force)]), rows), load, &
+               1.0e6_wp*eps, &
                scale, "balance of case " // to_text(i))
             call check_true(error, all(norm2(force(2:, :), 1) <= problem%mu*force(1, :) &
                + 1.0e6_wp*eps*scale), "friction of case " // to_text(i))

@@ -3,7 +3,8 @@
 module test_contact_rounds
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_active_set, only : active_set_begin, active_set_init, active_set_select, &
-      active_set_t, candidates_clear, candidates_t, step_done, step_stands_off, step_too_far, touch_tol
+      active_set_t, candidates_clear, candidates_t, step_done, step_stands_off, step_too_far, &
+      touch_tol
    use emcon_active_set_solve, only : active_set_solve
    use emcon_constraints, only : constraints_evaluate
    use emcon_contact_candidates, only : candidates_keep_forces, candidates_select
@@ -349,7 +350,8 @@ contains
                      held(k) = merge(gap0(k), floor%closed, self%holds_gap .and. &
                         active%is_candidate(k))
                      ! What slip leads to: with the velocity along the floor at an end of 0.
-                     if (active%is_candidate(k) .and. .not. self%is_static) lead(k) = evaluation_displacement( &
+                     if (active%is_candidate(k) .and. .not. self%is_static) lead(k) = &
+                        evaluation_displacement( &
                         motion%evaluation, motion%v0(1, node), 0.0_wp)
                      if (floor%leaves(i)) held(k) = -huge(scale)
                   end associate
@@ -433,7 +435,8 @@ contains
             if (self%keeps_factor .and. .not. self%mu > 0.0_wp) call check_one_factor(self, error)
             associate (active => self%active)
                call check_true(error, all(active%candidates%n_change > 0 .or. active%is_active &
-                  .or. .not. active%candidates%takes_part), "that one has opened is counted, case " &
+                  .or. .not. active%candidates%takes_part), &
+                  "that one has opened is counted, case " &
                   // to_text(i))
                call check_true(error, active%n_newton > 0, "iterations are counted")
                n_open = n_open + count(active%is_candidate .and. .not. active%is_active)
@@ -473,8 +476,8 @@ contains
          none%is_settled, none%one_closes, none%is_new_set]), "of all")
    end subroutine test_clear
 
-   !> In a unit of length that is a power of two, with density and modulus in it, every number is the
-   !> same but for that power: in the same iterations.
+   !> In a unit of length that is a power of two, with density and modulus in it, every number is
+   !> the same but for that power: in the same iterations.
    subroutine test_units(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: power(3) = [0, 24, -17]
@@ -509,9 +512,11 @@ contains
             end do
             do k = 2, 3
                associate (unit => 2.0_wp**power(k), one => self(1)%active, other => self(k)%active)
-                  call check_near(error, self(k)%motion%du/unit, self(1)%motion%du, 0.0_wp, 1.0_wp, &
+                  call check_near(error, self(k)%motion%du/unit, self(1)%motion%du, 0.0_wp, &
+                     1.0_wp, &
                      "motion, case " // to_text(i))
-                  call check_equal(error, [other%n_newton, other%set%n], [one%n_newton, one%set%n], &
+                  call check_equal(error, [other%n_newton, other%set%n], [one%n_newton, &
+                     one%set%n], &
                      "iterations and contacts")
                   if (allocated(error)) return
                   call check_near(error, other%set%lam(:one%set%n)/unit, one%set%lam(:one%set%n), &
@@ -565,8 +570,8 @@ contains
       end do
    end subroutine test_kept
 
-   !> An equation that is solved with its multiplier, whatever tells which contacts act: there is one
-   !> solution, to whose motion all of that leads.
+   !> An equation that is solved with its multiplier, whatever tells which contacts act: there is
+   !> one solution, to whose motion all of that leads.
    subroutine test_linked(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: u(6), du(2, 6)
@@ -611,8 +616,8 @@ contains
       call check_true(error, n_act > 64, "contacts act")
    end subroutine test_linked
 
-   !> With all contacts as candidates what comes out balances and obeys the laws, too, and once it is
-   !> near each iterate leaves the square of what the one before has left.
+   !> With all contacts as candidates what comes out balances and obeys the laws, too, and once it
+   !> is near each iterate leaves the square of what the one before has left.
    subroutine test_at_once(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: u(7)
@@ -675,8 +680,8 @@ contains
 
    end subroutine test_at_once
 
-   !> Nothing moves farther in a correction than contacts that are no candidates allow, and the first
-   !> that would ends the solve.
+   !> Nothing moves farther in a correction than contacts that are no candidates allow, and the
+   !> first that would ends the solve.
    subroutine test_early(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: u(7), start(2, 6)
@@ -700,7 +705,8 @@ contains
             if (allocated(error)) return
             call check_equal(error, self%status, merge(newton_early, newton_converged, i < 12), &
                "status of case " // to_text(i))
-            if (i < 12) call check_near(error, maxval(abs(self%motion%du - start)), 1.0e-3_wp, tol, &
+            if (i < 12) call check_near(error, maxval(abs(self%motion%du - start)), 1.0e-3_wp, &
+               tol, &
                1.0_wp, "how far it goes in case " // to_text(i))
          end block
       end do
@@ -736,11 +742,14 @@ contains
             call check_laws(self, "case " // to_text(i), error)
             if (allocated(error)) return
             associate (convergence => self%newton%convergence, phases => self%system%phases)
-               call check_equal(error, convergence%n_iteration, 1, "tangents of case " // to_text(i))
+               call check_equal(error, convergence%n_iteration, 1, "tangents of case " &
+                  // to_text(i))
                call check_true(error, convergence%history(2) <= tol .and. convergence%last <= tol, &
-                  "what is left in case " // to_text(i) // ": " // to_text(convergence%history(2), 3))
+                  "what is left in case " // to_text(i) // ": " &
+                  // to_text(convergence%history(2), 3))
                ! The rest of it is made exact by the same tangent, as long as that gains.
-               call check_true(error, self%newton%n_solve <= 3, "corrections of case " // to_text(i))
+               call check_true(error, self%newton%n_solve <= 3, "corrections of case " &
+                  // to_text(i))
                call check_equal(error, [self%newton%n_solve, int(phases%n_solve), &
                   int(phases%n_factorisation)], [convergence%n_history - 1, convergence%n_history &
                   - 1, 1], "what is counted in case " // to_text(i))
@@ -780,8 +789,8 @@ contains
       end do
    end subroutine test_first_guess
 
-   !> In equilibrium, its upper nodes pushed down and aside: by sets that trials tell, and all at once,
-   !> a block comes to rest the same way.
+   !> In equilibrium, its upper nodes pushed down and aside: by sets that trials tell, and all at
+   !> once, a block comes to rest the same way.
    subroutine test_static(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: u(6), du(2, 6)

@@ -109,7 +109,8 @@ contains
             du = matmul(turn, at) - at + 0.3_wp
          end associate
          do i = 1, contact%n_constraint
-            if (contact%state(i)%is_near) call check_near(error, contact%slip(i, scene%x, scene%u0, &
+            if (contact%state(i)%is_near) call check_near(error, contact%slip(i, scene%x, &
+               scene%u0, &
                du), [0.0_wp, 0.0_wp], tol, 1.0_wp, to_text(k) // " " // to_text(i))
          end do
       end do
@@ -183,7 +184,8 @@ contains
                do s = 1, 2
                   call check_near(error, dot_product(reshape(item(i)%t1(:, :n, s), [3*n]), by), &
                      (up(i)%slip(s) - down(i)%slip(s))/(2.0_wp*step), bound, 1.0_wp, "gradient")
-                  call check_near(error, matmul(item(i)%ht(:3*n, :3*n, s), by), reshape((up(i)%t(:, &
+                  call check_near(error, matmul(item(i)%ht(:3*n, :3*n, s), by), &
+                     reshape((up(i)%t(:, &
                      :n, s) - down(i)%t(:, :n, s))/(2.0_wp*step), [3*n]), bound, &
                      max(1.0_wp, maxval(abs(item(i)%ht(:3*n, :3*n, s)))), "second derivative")
                end do

@@ -1,7 +1,8 @@
 !> The energy balance of a run, by increments of several schemes whose figures are known.
 module test_energy_watch
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_energy_watch, only : closing_text, energy_bar, energy_follow, energy_is_failure, energy_move, &
+   use emcon_energy_watch, only : closing_text, energy_bar, energy_follow, energy_is_failure, &
+      energy_move, &
       energy_reasons, energy_rounding, energy_start, energy_warnings, energy_watch_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp

@@ -167,8 +167,9 @@ contains
       call check_equal(error, size(ridges%facet, 2), 2*8 + 5, "ridges")
       do i = 1, size(facets%node)
          associate (at => scene%x(:, facets%node(i)))
-            if (abs(at(1) - 0.5_wp) < 0.1_wp .and. abs(at(3) - 0.5_wp) < 0.1_wp) &
+            if (abs(at(1) - 0.5_wp) < 0.1_wp .and. abs(at(3) - 0.5_wp) < 0.1_wp) then
                call check_equal(error, n_groups(facets, groups, facets%node(i)), 3, "inside")
+            end if
          end associate
       end do
       do i = 1, size(ridges%facet, 2)

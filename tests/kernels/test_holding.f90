@@ -39,8 +39,8 @@ contains
          test_case_t("what a load pulls away is told", test_away)]
    end subroutine collect_holding
 
-   !> Conditions k of node k alone, with the gradient `c` and the gap `target`; edges are 1 long. All
-   !> that is a length in units.
+   !> Conditions k of node k alone, with the gradient `c` and the gap `target`; edges are 1 long.
+   !> All that is a length in units.
    subroutine make_set(set, c, target, unit)
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(in) :: c(:, :)            !! (2, n)
@@ -59,7 +59,8 @@ contains
    end subroutine make_set
 
    !> gap/rate; what closes within a thousandth of an edge closes too; what slips or opens does not.
-   !> What is closed already is there at once. In any unit of length. Guards hold what is near alone.
+   !> What is closed already is there at once. In any unit of length. Guards hold what is near
+   !> alone.
    subroutine test_next(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: c(2, 6) = reshape([0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, &

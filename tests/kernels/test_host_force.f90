@@ -167,7 +167,8 @@ contains
       call stepper_close(hosted)
    end subroutine test_magnitude
 
-   !> Two nodes of the host hang on others of it: the matrix is that of elements with the same links.
+   !> Two nodes of the host hang on others of it: the matrix is that of elements with the same
+   !> links.
    subroutine test_linked(error)
       type(error_t), allocatable, intent(out) :: error
       type(stepper_t) :: own, hosted

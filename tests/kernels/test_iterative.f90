@@ -2,6 +2,7 @@
 !> as good as was asked for, and what happens where there are none.
 module test_iterative
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+   use, intrinsic :: iso_fortran_env, only : real32
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_chosen_solver, only : chosen_solver_t
    use emcon_csr, only : csr_from_entries, csr_multiply, csr_t
@@ -23,7 +24,7 @@ module test_iterative
    !> Round-off of products, and of solutions to all digits with conditions below 1e3.
    real(dp), parameter :: tol = 1.0e4_dp*epsilon(1.0_dp)
    !> Of factors in single precision.
-   real(dp), parameter :: rough_tol = 1.0e3_dp*epsilon(1.0)
+   real(dp), parameter :: rough_tol = 1.0e3_dp*epsilon(1.0_real32)
    !> Nodes of a small lattice.
    integer, parameter :: n_x = 4, n_y = 3, n_z = 3
 

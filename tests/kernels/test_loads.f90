@@ -7,9 +7,11 @@ module test_loads
    use emcon_kinds, only : dp, wp
    use emcon_prescribed, only : prescribed_motion
    use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
+   use emcon_moment_load_space, only : push_frame, push_frame_stiffness
    use emcon_motion, only : motion_of
    use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_pressure_plane, only : add_pressure
+   use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_build, stepper_close, stepper_t
    use emcon_steps, only : load_centrifugal, load_gravity, load_point, load_pressure, load_t, &
@@ -42,6 +44,7 @@ contains
          test_case_t("gravity sums to the weight", test_gravity), &
          test_case_t("bodies that turn about an axis", test_centrifugal), &
          test_case_t("a moment is a couple", test_moment), &
+         test_case_t("a moment in space", test_moment_space), &
          test_case_t("amplitudes in step and total time", test_amplitude), &
          test_case_t("smooth amplitudes", test_smooth), &
          test_case_t("ramp of a static step", test_ramp), &
@@ -382,6 +385,57 @@ contains
          end do
       end do
    end subroutine test_moment
+
+   !> On four nodes anywhere: no resultant, the moment, the work M.w of a rigid spin; the derivative
+   !> by differences.
+   subroutine test_moment_space(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: step = epsilon(1.0_wp)**(1.0_wp/3.0_wp), &
+         moment(3) = [-1.5_wp, 0.5_wp, 2.0_wp], spin(3) = [0.3_wp, -0.7_wp, 0.4_wp]
+      integer, parameter :: node(4) = [3, 1, 5, 4]
+      real(wp) :: force(3, 5), low(3, 5), high(3, 5), place(3, 4), total(3), work, row(12)
+      real(dp) :: value(72), side(72)
+      integer :: slot(12, 12), i, j, k
+
+      call shake(place, 0.2_wp)
+      place(:, 2:) = place(:, 2:) + reshape([1.0_wp, 0.2_wp, 0.0_wp, 0.1_wp, 0.8_wp, 0.3_wp, &
+         -0.2_wp, 0.0_wp, 0.9_wp], [3, 3])
+      force = 2.0_wp
+      call push_frame(node, moment, place, force)
+      force = force - 2.0_wp
+      total = 0.0_wp
+      work = 0.0_wp
+      do i = 1, 4
+         total = total + cross_product(place(:, i), force(:, node(i)))
+         work = work + dot_product(cross_product(spin, place(:, i)), force(:, node(i)))
+      end do
+      call check_near(error, sum(force, 2), [0.0_wp, 0.0_wp, 0.0_wp], tol, 4.0_wp, "no resultant")
+      call check_near(error, total, moment, tol, 4.0_wp, "moment")
+      call check_near(error, work, dot_product(moment, spin), tol, 4.0_wp, "work")
+      call check_near(error, force(:, 2), [0.0_wp, 0.0_wp, 0.0_wp], tol, 1.0_wp, "no other node")
+      ! Half of the entries are of the side.
+      slot = reshape([(merge(i, 72 - i, i <= 72), i = 1, 144)], [12, 12])
+      value = 0.0_dp
+      side = 0.0_dp
+      call push_frame_stiffness(place, moment, slot, value, side)
+      do k = 1, 12
+         low = 0.0_wp
+         high = 0.0_wp
+         associate (at => place(1 + mod(k - 1, 3), 1 + (k - 1)/3))
+            at = at - step
+            call push_frame(node, moment, place, low)
+            at = at + 2.0_wp*step
+            call push_frame(node, moment, place, high)
+            at = at - step
+         end associate
+         do j = 1, 12
+            if (slot(j, k) > 0) row(j) = real(value(slot(j, k)), wp)
+            if (slot(j, k) < 0) row(j) = real(side(-slot(j, k)), wp)
+         end do
+         call check_near(error, row, reshape(low(:, node) - high(:, node), [12])/(2.0_wp*step), &
+            max(100.0_wp*step**2, tol_dp), 10.0_wp, "less than their derivative")
+      end do
+   end subroutine test_moment_space
 
    !> (1, 0), (2, 4), (3, 2): constant outside; one load sees step time, the other total time.
    subroutine test_amplitude(error)

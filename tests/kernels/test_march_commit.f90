@@ -370,7 +370,8 @@ contains
          if (allocated(error)) return
          expected = 0.0_wp
          expected(set%id(:set%n)) = set%lam(:set%n)
-         call check_true(error, any(set%n == [1, 2]) .and. all(abs(set%lam(:set%n)) > 0.0_wp), "some act")
+         call check_true(error, any(set%n == [1, 2]) .and. all(abs(set%lam(:set%n)) > 0.0_wp), &
+            "some act")
          call check_near(error, now%lam, expected, 0.0_wp, 1.0_wp, "multipliers")
          call check_true(error, all(now%is_active .eqv. abs(expected) > 0.0_wp), "what acts")
          call check_near(error, now%closure, 0.0_wp*expected, 0.0_wp, 1.0_wp, "nothing gives way")

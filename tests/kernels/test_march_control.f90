@@ -409,8 +409,9 @@ contains
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          do i = 1, increment%notes%n
-            if (index(increment%notes%item(i)%text, "event: contact begins in pair 1") == 1) &
+            if (index(increment%notes%item(i)%text, "event: contact begins in pair 1") == 1) then
                n_told = n_told + 1
+            end if
          end do
          if (n_told > 0) exit
          call check_true(error, march%state%clock%time <= at, "none is passed")
@@ -493,8 +494,9 @@ contains
       call stepper_close(stepper)
    end subroutine test_cut
 
-   !> A spring that may not be longer than a part of h, at the velocity 1: the first half of the first
-   !> increment is shorter, the second one is cut until it is, to a sixteenth of the increment.
+   !> A spring that may not be longer than a part of h, at the velocity 1: the first half of the
+   !> first increment is shorter, the second one is cut until it is, to a sixteenth of the
+   !> increment.
    subroutine test_second(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: longest = 0.7_wp*h
@@ -619,7 +621,8 @@ contains
 
    end subroutine test_apart
 
-   !> A block that flies has no error: its increments grow, unless its surface is paired with itself.
+   !> A block that flies has no error: its increments grow, unless its surface is paired with
+   !> itself.
    subroutine test_self(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

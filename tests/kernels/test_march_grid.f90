@@ -109,8 +109,8 @@ contains
 
    end subroutine test_units
 
-   !> Quarters of the last interval, which is shorter, after a thousand: they are quarters of it, not
-   !> differences of times, whose rounding is a thousand times theirs.
+   !> Quarters of the last interval, which is shorter, after a thousand: they are quarters of it,
+   !> not differences of times, whose rounding is a thousand times theirs.
    subroutine test_late(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

@@ -143,8 +143,9 @@ contains
                - ledger%contact_work + ledger%friction, total, tol, total, "energy, " // what)
          end associate
          call check_massless(error, march, scene%step(1)%time%h, what)
-         if (increment%n_cut == 0 .and. scene%pair(1)%interaction%restitution < 1.0_wp) &
+         if (increment%n_cut == 0 .and. scene%pair(1)%interaction%restitution < 1.0_wp) then
             call check_cone(error, march, scene%pair(1)%interaction%friction, what)
+         end if
          do i = 1, increment%notes%n
             call check_true(error, index(increment%notes%item(i)%text, "saddle point") == 0, &
                "by the null space, " // what)

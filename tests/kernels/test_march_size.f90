@@ -179,7 +179,8 @@ contains
             call march_free(march)
          end block
       end do
-      ! Three of nine nodes of a mass of 4 have a quarter of it; a shear is linear in so short a way.
+      ! Three of nine nodes of a mass of 4 have a quarter of it; a shear is linear in so short a
+      ! way.
       call check_near(error, work(1, 1), 0.5_wp*1.0_wp*speed**2 + strain, 64.0_wp*epsilon(1.0_wp), &
          1.0_wp, "energy of what is driven")
       call check_near(error, work(:, -1), work(:, 1), 64.0_wp*epsilon(1.0_wp), 1.0_wp, "mirrored")

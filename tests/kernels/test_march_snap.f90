@@ -229,8 +229,8 @@ contains
       call march_free(march)
    end subroutine test_left
 
-   !> At the end of a step viscous forces of a thousandth are told, by the root of what is stored: of
-   !> the largest energy before, or of this one where it is larger; not without STABILIZE.
+   !> At the end of a step viscous forces of a thousandth are told, by the root of what is stored:
+   !> of the largest energy before, or of this one where it is larger; not without STABILIZE.
    subroutine test_told(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: part(6) = [1.05_wp, 0.95_wp, 1.05_wp, 0.95_wp, 1.05_wp, 1.05_wp], &
@@ -270,8 +270,10 @@ contains
 
       n = 0
       do i = 1, verdict%warnings%n
-         if (index(verdict%warnings%item(i)%text, "at the end of step 1 STABILIZE carries ") == 1) &
+         if (index(verdict%warnings%item(i)%text, "at the end of step 1 STABILIZE carries ") &
+            == 1) then
             n = n + 1
+         end if
       end do
    end function count_told
 

@@ -97,8 +97,8 @@ contains
       end do
    end subroutine test_pressure
 
-   !> What pushes at the point in the middle alone is handed to its node and its ends by 4/3 and -1/6;
-   !> what pushes at ends alone stays there.
+   !> What pushes at the point in the middle alone is handed to its node and its ends by 4/3 and
+   !> -1/6; what pushes at ends alone stays there.
    subroutine test_few(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -121,10 +121,12 @@ contains
          if (k == 1) call check_equal(error, item%node(:item%n_node), side([3, 1, 2]), "nodes")
          if (k == 2) call check_equal(error, item%node(:item%n_node), side([1, 2]), "the same")
          if (allocated(error)) return
-         if (k == 1) call check_near(error, item%g(:, :3), reshape([0.5_wp, 1.0_wp, 0.5_wp, 1.0_wp, &
+         if (k == 1) call check_near(error, item%g(:, :3), reshape([0.5_wp, 1.0_wp, 0.5_wp, &
+            1.0_wp, &
             0.5_wp, 1.0_wp], [2, 3])*spread([8.0_wp, -1.0_wp, -1.0_wp]/6.0_wp, 1, 2), tol, 1.0_wp, &
             "handed out")
-         if (k == 2) call check_near(error, item%g(:, :2), reshape([0.5_wp, 1.0_wp, 2.0_wp, 3.0_wp], &
+         if (k == 2) call check_near(error, item%g(:, :2), reshape([0.5_wp, 1.0_wp, 2.0_wp, &
+            3.0_wp], &
             [2, 2]), 0.0_wp, 1.0_wp, "as it was")
       end do
    end subroutine test_few

@@ -538,7 +538,8 @@ contains
                mortar%scale(j) = 0.25_wp
                call mortar%evaluate([j], scene%x, still, still, [0.0_wp], item(j:j))
                ! Of its edges and of no others.
-               call check_true(error, all(mortar%is_formed .eqv. [(any(mortar%node_edge(:, j) == e), &
+               call check_true(error, all(mortar%is_formed .eqv. [(any(mortar%node_edge(:, j) &
+                  == e), &
                   e = 1, 2)]), "edges that are formed" // text_of(i, k))
                if (area(1) < 0.9_wp*mortar%whole(j)) n_part = n_part + 1
                call check_near(error, condition_normal(item(j)), 4.0_wp*area(1), tol, 1.0_wp, &
@@ -618,7 +619,8 @@ contains
                   call check_equal(error, one(j)%node(:one(j)%n_node), over(j)%node(:m), "nodes")
                   if (allocated(error)) return
                   call check_near(error, one(j)%slip(1), over(j)%slip(1), 0.0_wp, 1.0_wp, "slip")
-                  call check_near(error, one(j)%t1(:, :m, 1), over(j)%t1(:, :m, 1), 0.0_wp, 1.0_wp, &
+                  call check_near(error, one(j)%t1(:, :m, 1), over(j)%t1(:, :m, 1), 0.0_wp, &
+                     1.0_wp, &
                      "its gradient" // text_of(i, k))
                   if (scheme == 2) call check_near(error, [one(j)%gap0, one(j)%dgap], &
                      [over(j)%gap0, over(j)%dgap], 0.0_wp, 1.0_wp, "gap of the step")

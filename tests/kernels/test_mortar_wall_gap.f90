@@ -85,7 +85,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n = 8
       type(wall_t) :: wall
-      real(wp) :: x(3, n_part_point), dx(3, n_part_point), weight(n_corner), part(3, n_part_point), &
+      real(wp) :: x(3, n_part_point), dx(3, n_part_point), weight(n_corner), part(3, &
+         n_part_point), &
          share(n_corner, n_corner), distance(n_corner), normal(3), total
       integer :: i, j, k, way
 

@@ -329,7 +329,8 @@ contains
             end associate
          end do
          do turn = 1, 2
-            call check_near(error, outline_curves_overlap(curves, e(turn), e(3 - turn), share([turn, &
+            call check_near(error, outline_curves_overlap(curves, e(turn), e(3 - turn), &
+               share([turn, &
                3 - turn]), scene%x, still), 4.0_wp*share(1)*(1.0_wp - share(1))*sagitta(1) &
                + minval(sagitta), 0.03_wp, sagitta(1) + minval(sagitta), "rings " // to_text(k))
          end do
@@ -356,7 +357,8 @@ contains
 
    end subroutine test_hollow
 
-   !> An L of three cells of 2 x 2, anyhow turned: nodes along the sides as far as they are straight.
+   !> An L of three cells of 2 x 2, anyhow turned: nodes along the sides as far as they are
+   !> straight.
    subroutine test_corners(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

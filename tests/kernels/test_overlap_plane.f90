@@ -65,10 +65,12 @@ contains
             best = found%edge
             call check_true(error, best > 0 .and. best /= 3, "an edge with a length")
             if (allocated(error)) return
-            call check_near(error, [found%square, square(best)], spread(minval(square), 1, 2), tol, &
+            call check_near(error, [found%square, square(best)], spread(minval(square), 1, 2), &
+               tol, &
                9.0_wp, "square of the distance")
             call check_near(error, found%share, share(best), tol, 1.0_wp, "share of the edge")
-            call check_near(error, node(:, best) + share(best)*found%along + found%to_point, b, tol, &
+            call check_near(error, node(:, best) + share(best)*found%along + found%to_point, b, &
+               tol, &
                3.0_wp, "from the place to the point")
             call check_equal(error, found%side, merge(1, merge(2, 0, share(best) >= 1.0_wp), &
                share(best) <= 0.0_wp), "its end")
@@ -101,7 +103,8 @@ contains
          call check_near(error, depth, merge(1, -1, is_in)*sqrt(found%square), tol, 4.0_wp, &
             "depth at " // to_text(b(1)) // ", " // to_text(b(2)))
          if (found%side == 1) n_node(found%edge) = n_node(found%edge) + 1
-         if (found%side == 2) n_node(modulo(found%edge, 6) + 1) = n_node(modulo(found%edge, 6) + 1) &
+         if (found%side == 2) n_node(modulo(found%edge, 6) + 1) = n_node(modulo(found%edge, 6) &
+            + 1) &
             + 1
       end do
       call check_true(error, all(n_node > 5), "at all corners")
@@ -110,7 +113,7 @@ contains
    !> By the two parts at which lines meet, whatever the unit of length is.
    subroutine test_crossing(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: power(2) = [0, nint(0.3*minexponent(1.0_wp))]
+      integer, parameter :: power(2) = [0, nint(0.3_wp*minexponent(1.0_wp))]
       real(wp) :: a(2), to_b(2, 2), b(2), across, of_a, of_b, share
       integer :: i, k, n
       logical :: crosses, enters
@@ -132,7 +135,8 @@ contains
             call crossing_find(scale(a, power(k)), scale(to_b, power(k)), crosses, share, enters)
             call check_true(error, crosses .eqv. min(of_a, 1.0_wp - of_a, of_b, 1.0_wp - of_b) &
                > 0.0_wp, "do they cross")
-            call check_near(error, share, merge(of_a, 0.0_wp, crosses), 100.0_wp*tol, 1.0_wp, "where")
+            call check_near(error, share, merge(of_a, 0.0_wp, crosses), 100.0_wp*tol, 1.0_wp, &
+               "where")
             if (crosses) call check_true(error, enters .eqv. across < 0.0_wp, "which way")
             if (crosses) n = n + 1
          end do
@@ -240,8 +244,8 @@ contains
       end do
    end subroutine test_middle
 
-   !> A long edge at the height 0.9 cuts three teeth that stand on 1/2, of which one reaches up to 1.4
-   !> and the others to 1.2: deepest is its middle within the highest, by the side of that.
+   !> A long edge at the height 0.9 cuts three teeth that stand on 1/2, of which one reaches up to
+   !> 1.4 and the others to 1.2: deepest is its middle within the highest, by the side of that.
    subroutine test_teeth(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: at = 0.9_wp, low = 0.5_wp, high = 1.4_wp
@@ -267,7 +271,8 @@ contains
                ! A strip that is bent back above itself, the long edge its last one.
                call add_block(scene, "CPE4", [9, 1], [0.0_wp, -1.0_wp], [9.0_wp, 1.0_wp], block)
                scene%x(:, 11:) = reshape([teeth, 7.0_wp, 0.25_wp, 7.0_wp, at, -0.5_wp, at], [2, 10])
-               scene%x(:, 8:10) = reshape([8.0_wp, -1.0_wp, 8.0_wp, 2.4_wp, -0.5_wp, 2.4_wp], [2, 3])
+               scene%x(:, 8:10) = reshape([8.0_wp, -1.0_wp, 8.0_wp, 2.4_wp, -0.5_wp, 2.4_wp], [2, &
+                  3])
                call add_surface(scene, "SKIN", block, [bottom, right, top, left])
                scene%pair = [contact_pair_t(slave=1, master=1)]
             end if

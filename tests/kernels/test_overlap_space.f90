@@ -116,7 +116,8 @@ contains
    !> On top of each other, meshes of all kinds, like and mirrored ones: no depth at all.
    subroutine test_touch(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: low(3) = [0.0_wp, 0.0_wp, 0.0_wp], high(3) = [1.0_wp, 1.0_wp, 1.0_wp], &
+      real(wp), parameter :: low(3) = [0.0_wp, 0.0_wp, 0.0_wp], high(3) = [1.0_wp, 1.0_wp, &
+         1.0_wp], &
          up(3) = [0.0_wp, 0.0_wp, 1.0_wp]
       type(shape_surface_t) :: one, other
       real(wp) :: depth(2)
@@ -176,7 +177,8 @@ contains
    !> the deepest point is no node, and half the thickness (here 1) of an element behind a face.
    subroutine test_flush(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: low(3) = [0.0_wp, 0.0_wp, 0.0_wp], high(3) = [1.0_wp, 1.0_wp, 1.0_wp], &
+      real(wp), parameter :: low(3) = [0.0_wp, 0.0_wp, 0.0_wp], high(3) = [1.0_wp, 1.0_wp, &
+         1.0_wp], &
          shift(3, 4) = reshape([0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.5_wp, &
          0.0_wp, -0.5_wp, -0.5_wp, 0.0_wp, 0.0_wp, -0.9_wp], [3, 4])
       real(wp), parameter :: deep(4) = [0.5_wp, 0.5_wp, 0.5_wp, 0.1_wp]
@@ -191,7 +193,8 @@ contains
             call look(one, other, depth)
             call check_true(error, minval(depth) >= deep(k)/2, "boxes of " // to_text(n) // &
                " elements a side, place " // to_text(k))
-            call check_true(error, maxval(depth) <= (1.0_wp + tol)*deep(k), "no deeper than they are")
+            call check_true(error, maxval(depth) <= (1.0_wp + tol)*deep(k), &
+               "no deeper than they are")
          end do
       end do
    end subroutine test_flush
@@ -227,7 +230,8 @@ contains
       call check_near(error, depth, [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "in the hole")
       one%x(1, :) = one%x(1, :) + 0.45_wp
       call look(one, other, depth)
-      call check_true(error, depth(1) > 0.04_wp .and. depth(1) <= 0.05_wp + tol, "in its wall: " // to_text(depth(1), 17))
+      call check_true(error, depth(1) > 0.04_wp .and. depth(1) <= 0.05_wp + tol, "in its wall: " &
+         // to_text(depth(1), 17))
    end subroutine test_hole
 
    !> One facet alone: what crosses it counts, what passes beside it does not.
@@ -239,7 +243,8 @@ contains
 
       call make_box(one, [4, 4, 4], [-0.5_wp, -0.5_wp, -0.05_wp], [0.5_wp, 0.5_wp, 0.95_wp])
       allocate(sheet%x(3, 4), sheet%facet(4, 1))
-      sheet%x = reshape([-1.0_wp, -1.0_wp, 0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp, &
+      sheet%x = reshape([-1.0_wp, -1.0_wp, 0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, &
+         0.0_wp, &
          -1.0_wp, 1.0_wp, 0.0_wp], [3, 4])
       sheet%facet(:, 1) = [1, 2, 3, 4]
       call look(one, sheet, depth, overlap)

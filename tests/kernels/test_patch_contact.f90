@@ -1,4 +1,5 @@
-!> Contact of nodes in space, and mortar, over stencils of meshes: gaps, identities, momenta, derivatives, ends.
+!> Contact of nodes in space, and mortar, over stencils of meshes: gaps, identities, momenta,
+!> derivatives, ends.
 module test_patch_contact
    use box_contacts, only : box_kind => kind, draw, evaluate, look, make_boxes, seen, sum_up
    use check, only : check_near, check_true, test_case_t
@@ -20,8 +21,8 @@ module test_patch_contact
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Some 100 roundings of quantities of size 1, here by the length of a patch, 1/30.
    real(wp), parameter :: tol = 1.0e4_wp*eps
-   !> What closing terms leave out as round-off: 16 epsilon of a field that falls over a twentieth of a
-   !> facet, by the least that is covered, 1/50; of four triangles with multipliers of up to 3.
+   !> What closing terms leave out as round-off: 16 epsilon of a field that falls over a twentieth
+   !> of a facet, by the least that is covered, 1/50; of four triangles with multipliers of up to 3.
    real(wp), parameter :: left_out = 16.0_wp*eps*20.0_wp*50.0_wp*4.0_wp*3.0_wp
 
 contains
@@ -100,9 +101,9 @@ contains
       call check_true(error, count(contact%state%is_over) >= 9, "nodes are over it")
    end subroutine test_thin
 
-   !> A bar that leans in the hole of a plate. Along the normal of its right side are the wall of the
-   !> hole in front and, far behind, the upper side of the plate, which hangs together with the wall
-   !> around the hole and faces the bar too: a mean of both is a height of neither.
+   !> A bar that leans in the hole of a plate. Along the normal of its right side are the wall of
+   !> the hole in front and, far behind, the upper side of the plate, which hangs together with the
+   !> wall around the hole and faces the bar too: a mean of both is a height of neither.
    subroutine test_hole(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: tip(2) = [1.6_wp, -0.25_wp], s = sin(20.0_wp*acos(-1.0_wp)/180.0_wp), &
@@ -215,8 +216,8 @@ contains
       end do
    end subroutine test_derivatives
 
-   !> The upper box slides off: what is past the end by more than the flange and the patch is let go,
-   !> and gaps stay what they are up to there.
+   !> The upper box slides off: what is past the end by more than the flange and the patch is let
+   !> go, and gaps stay what they are up to there.
    subroutine test_end(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -235,7 +236,8 @@ contains
                if (state%is_over) call check_near(error, state%gap0, 0.02_wp, tol, 1.0_wp, "gap")
                if (at(1) <= 1.0_wp + 16.0_wp*eps .and. at(1) >= -16.0_wp*eps) then
                   call check_true(error, any(contact%state%is_over .and. contact%node &
-                     == contact%node(i) .and. contact%cover > 1.0_wp - tol), "all of the patch, by " // &
+                     == contact%node(i) .and. contact%cover > 1.0_wp - tol), &
+                     "all of the patch, by " // &
                      to_text(past, 3))
                end if
                if (at(1) > 1.15_wp .or. at(1) < -0.15_wp) then

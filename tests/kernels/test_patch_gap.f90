@@ -194,7 +194,8 @@ contains
       end do
    end subroutine test_tangent
 
-   !> A patch whose sides lie on sides of triangles, or whose corner is a vertex, moved by round-off.
+   !> A patch whose sides lie on sides of triangles, or whose corner is a vertex, moved by
+   !> round-off.
    subroutine test_aligned(error)
       type(error_t), allocatable, intent(out) :: error
       type(patch_t) :: patch

@@ -135,7 +135,8 @@ contains
             short = merge(0.0_wp, 10.0_wp**(-k), k == 15)
             if (k < 5) cycle
             call pressure_mean(curve, at, at + short, mean, rate)
-            call check_near(error, mean, p + 0.5_wp*slope*short, tol + 1.0e3_wp*short**2, 1.0_wp + p, &
+            call check_near(error, mean, p + 0.5_wp*slope*short, tol + 1.0e3_wp*short**2, 1.0_wp &
+               + p, &
                "mean of kind " // to_text(kind))
             call check_near(error, rate, 0.5_wp*slope, tol + 1.0e3_wp*short, 10.0_wp + slope, &
                "rate of kind " // to_text(kind))

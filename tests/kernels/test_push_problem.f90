@@ -24,9 +24,9 @@ contains
          test_case_t("opposite gaps cannot both open", test_opposite)]
    end subroutine collect_push_problem
 
-   !> A third of the rows are others once more, a third are sums of two; the gaps are such that there
-   !> is a solution. No gap is closed, no push pulls, and none of them does work, from whatever it
-   !> begins: no push, drawn ones, its own solution, which stands.
+   !> A third of the rows are others once more, a third are sums of two; the gaps are such that
+   !> there is a solution. No gap is closed, no push pulls, and none of them does work, from
+   !> whatever it begins: no push, drawn ones, its own solution, which stands.
    subroutine test_drawn(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: row(:, :), w(:, :), free(:), push(:), gap(:), extra(:), motion(:)

@@ -43,8 +43,8 @@ contains
          test_case_t("pushes that stay leave what slides on", test_stay)]
    end subroutine collect_stopping_jump
 
-   !> Sliding along x friction tips: m g h = 1, mu = .4 and the speed of the end is against it. As it
-   !> stops, pushes behind and before differ by what is left of friction times the height.
+   !> Sliding along x friction tips: m g h = 1, mu = .4 and the speed of the end is against it. As
+   !> it stops, pushes behind and before differ by what is left of friction times the height.
    subroutine test_whole(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: mu = 0.4_wp, back = -0.125_wp, weight = 1.0_wp

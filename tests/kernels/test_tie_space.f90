@@ -226,7 +226,8 @@ contains
       call check_equal(error, rows%slave, [3, 4, 7, 8], "rows")
       call check_rows(scene, rows, error)
       if (allocated(error)) return
-      ! Facets of area 1: halves of the second one go to nodes 3 and 7, quarters of the third to all.
+      ! Facets of area 1: halves of the second one go to nodes 3 and 7, quarters of the third to
+      ! all.
       call check_near(error, rows%size, [1.75_wp, 0.25_wp, 0.75_wp, 0.25_wp], tol, 1.0_wp, &
          "sizes")
    end subroutine test_lonely

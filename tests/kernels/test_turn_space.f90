@@ -44,7 +44,8 @@ contains
    !> Small ones are turns by the first order; on either side of the end of series both agree.
    subroutine test_small(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: axis(3) = [2.0_wp, -1.0_wp, 2.0_wp]/3.0_wp, rate(3) = [1.0_wp, 2.0_wp, -1.0_wp]
+      real(wp), parameter :: axis(3) = [2.0_wp, -1.0_wp, 2.0_wp]/3.0_wp, rate(3) = [1.0_wp, &
+         2.0_wp, -1.0_wp]
       real(wp) :: w(3), v(3), other_w(3), other_v(3), angle
 
       call turn_arm_space(arm, still, rate, w, v)
@@ -61,7 +62,8 @@ contains
 
    subroutine test_rate(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: start(3) = [0.4_wp, -0.9_wp, 1.1_wp], rate(3) = [1.0_wp, 0.3_wp, -0.7_wp]
+      real(wp), parameter :: start(3) = [0.4_wp, -0.9_wp, 1.1_wp], rate(3) = [1.0_wp, 0.3_wp, &
+         -0.7_wp]
       real(wp), parameter :: h = eps**(1.0_wp/3.0_wp)
       real(wp) :: before(3), after(3), w(3), v(3), none(3), size
       integer :: k

@@ -239,7 +239,8 @@ contains
       if (allocated(error)) return
       call check_true(error, jump%is_done .and. abs(slip) > 1.0e-3_wp, "it is taken")
       call check_near(error, condition_rate(set%item(2), v, 1), 0.0_wp, tol, 1.0_wp, "a stop")
-      call check_near(error, pack(jump%impulse, jump%stopping%stays), spread(0.0_wp, 1, 5), 0.0_wp, 1.0_wp, &
+      call check_near(error, pack(jump%impulse, jump%stopping%stays), spread(0.0_wp, 1, 5), &
+         0.0_wp, 1.0_wp, &
          "pushes stay")
       call check_near(error, [jump%gained, -sum(jump%rubbed)], spread(energy_of(system, v) &
          - energy_of(system, v0), 1, 2), tol, 1.0_wp, "energy")
@@ -358,9 +359,9 @@ contains
       call velocity_update_free(update)
    end subroutine look_at_push
 
-   !> Of three conditions the last two are such as rigid bodies have: their rates are 0 behind it, by
-   !> impulses along them. What is lost is the energy of the jump, what is gained that of all: less
-   !> so by what is driven.
+   !> Of three conditions the last two are such as rigid bodies have: their rates are 0 behind it,
+   !> by impulses along them. What is lost is the energy of the jump, what is gained that of all:
+   !> less so by what is driven.
    subroutine test_hold(error)
       type(error_t), allocatable, intent(out) :: error
       type(system_t) :: system

@@ -172,7 +172,8 @@ contains
          call follow(stepper, 1.0_wp, increment)
          associate (place => stepper%verdict%overlap%place)
             call check_true(error, (index(place, "a body has gone through itself by then, node " &
-               // "10 of body 1 is 0.25 behind the edge from node 7 to 6") > 0) .eqv. body(k) == 1, &
+               // "10 of body 1 is 0.25 behind the edge from node 7 to 6") > 0) .eqv. body(k) &
+               == 1, &
                "own " // to_text(k) // ": " // place)
          end associate
          call march_free(stepper%march)

@@ -235,8 +235,9 @@ contains
                end do
             end do
             ! One in a thousand ends within `small` of a joint.
-            if (any(abs(slope - gap%c) > fine) .or. any(abs(change - gap%h) > 10.0_wp*fine)) &
+            if (any(abs(slope - gap%c) > fine) .or. any(abs(change - gap%h) > 10.0_wp*fine)) then
                m = m + 1
+            end if
          end do
       end do
       call check_true(error, m <= 2, to_text(m) // " of " // to_text(40*n_shape) // " are wrong")
@@ -292,7 +293,8 @@ contains
          call wall_shape_make(shape, wall, middle, reach)
          do k = 1, size(shape%point, 2)
             spot = wall_find(wall, at, shape%point(:, k))
-            call check_near(error, spot%distance, 0.0_wp, tol, 1.0_wp, "on shape " // to_text(number))
+            call check_near(error, spot%distance, 0.0_wp, tol, 1.0_wp, "on shape " &
+               // to_text(number))
          end do
          do k = 1, size(shape%cell, 2)
             associate (x => shape%point(:, shape%cell(:, k)))

@@ -59,6 +59,14 @@ def test_counts_that_rise_are_told():
     assert rises(stored, {"ring": {"cuts": 1}})[0]
 
 
+def test_the_table_of_goals_says_what_their_reports_say():
+    page = trade_studies.PAGE.read_text()
+    shown = {name: re.search(f"<!-- {name} -->\n(.*?)<!-- end -->", page, re.DOTALL)[1].splitlines()
+             for name in ("goals", "goal table")}
+    assert trade_studies.goal_table(shown["goals"]) == shown["goal table"]
+    assert len(shown["goal table"]) == 2 + 5
+
+
 def test_runs_of_trade_go_on_where_they_were(tmp_path):
     """A run that is there is taken as it is; not one of another deck, or that did not end."""
     deck = Deck.read(DECKS / "bouncing_bar.inp")

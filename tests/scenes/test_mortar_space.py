@@ -53,6 +53,20 @@ def test_a_ball_bounces_off_a_plate(first: str, second: str, tmp_path: Path) -> 
     check_impact(ran(tmp_path, impact(first, second, options=MORTAR)), GUARDED)
 
 
+def test_surface_to_surface_is_mortar(tmp_path: Path) -> None:
+    """As other programs call it: the same bits, and no warning."""
+    histories = []
+    for word in ("MORTAR", "SURFACE TO SURFACE"):
+        folder = tmp_path/word[0]
+        folder.mkdir()
+        run = ran(folder, press([(2, 2, 1), (3, 3, 1)], ["C3D8", "C3D8"], 0.05, np.eye(3), options=f", TYPE={word}"))
+        histories.append(run.history)
+    for name in histories[0].dtype.names:
+        if name not in ("wall", "cpu"):
+            assert np.array_equal(histories[0][name], histories[1][name], equal_nan=True), name
+    assert histories[0]["strain"][-1] > 0.0
+
+
 def test_newton_is_quadratic(tmp_path: Path) -> None:
     """Residuals of steps with contact: each about the square of the one before, or round-off."""
     run = ran(tmp_path, impact("C3D4", "C3D8", "*NEWTON, TYPE=FULL\n", options=MORTAR, cells=3))

@@ -193,12 +193,138 @@ def test_a_driven_turn(kind: str, tmp_path: Path) -> None:
         assert np.abs(mesh.x + u[:len(mesh.x)] - place).max() <= 1.0e-13
 
 
+MOMENT = np.array([0.3, -0.7, 0.5])
+#: Of the reference node, away from the centre.
+FOOT = (0.0, 0.25, -0.5)
+
+
+def about(history: np.ndarray, point: tuple[float, float, float]) -> np.ndarray:
+    """Angular momentum about a point that rests."""
+    momentum, angular = (np.array([history[n] for n in names]).T
+                         for names in (("px", "py", "pz"), ("lx", "ly", "lz")))
+    return angular - np.cross(point, momentum)
+
+
+@pytest.mark.parametrize("rotation", [False, True])
+def test_a_moment_is_the_rate_of_the_angular_momentum(rotation: bool, tmp_path: Path) -> None:
+    """Of a tumbling body whose reference node is off its centre, exactly, with work by moments and no resultant; by
+    forces on a ROT NODE the same bits."""
+    node = 9998 if rotation else REFERENCE
+    cards = "".join(f"{node}, {k + (0 if rotation else 3)}, {m!r}\n" for k, m in enumerate(MOMENT.tolist(), 1))
+    text, _ = top("C3D8", FOOT, TILT, SPIN, VELOCITY, dynamic(0.05, 200, f"*CLOAD\n{cards}"))
+    if rotation:
+        text = text.replace(f"*NODE\n{REFERENCE},", f"*NODE\n9998, 7., 7., 7.\n{REFERENCE},").replace(
+            f"REF NODE={REFERENCE}", f"REF NODE={REFERENCE}, ROT NODE=9998")
+    history = run(text, tmp_path).history
+    angular = np.array([history[name] for name in ("lx", "ly", "lz")]).T
+    wanted = angular[0] + np.outer(history["time"], MOMENT)
+    assert np.abs(angular - wanted).max() <= 1e-12*np.abs(angular).max()
+    assert drift(history, ["px", "py", "pz"]) <= 1e-12
+    assert history["kinetic"][-1] > 2*history["kinetic"][0]
+    assert np.abs(history["total"] - history["total"][0]).max() <= 1e-12*history["kinetic"].max()
+
+
+@pytest.mark.parametrize("axis", [1, 2, 3])
+def test_a_body_on_an_axle(axis: int, tmp_path: Path) -> None:
+    """Two rotations held at 0: under a moment about the third it turns as its moment of inertia about that axis says,
+    its angular momentum exactly, its angle to second order."""
+    held = "".join(f"{REFERENCE}, {k + 3}\n" for k in (1, 2, 3) if k != axis)
+    along, moment, time = np.eye(3)[axis - 1], 0.3, 4.0
+    out = TILT.apply(np.array(CENTRE) - FOOT)
+    inertia = (TILT.inv().apply(along)**2 @ [ACROSS, ACROSS, ALONG] + MASS*(out @ out - (out @ along)**2))
+    exact = Rotation.from_rotvec(along*moment*time**2/(2*inertia))
+    error = []
+    for n in (50, 100):
+        text, rest = top("C3D8", FOOT, TILT, np.zeros(3), (0, 0, 0), f"*BOUNDARY\n{REFERENCE}, 1, 3\n{held}"
+                         + dynamic(time/n, n, f"*CLOAD\n{REFERENCE}, {axis + 3}, {moment!r}\n"))
+        found = run(text, tmp_path/str(n))
+        momentum = about(found.history, FOOT)[:, axis - 1]
+        assert np.abs(momentum - moment*found.history["time"]).max() <= 1e-12*moment*time
+        fields = found.fields()
+        x = (fields.x + fields["displacement"][-1])[:len(rest)]
+        assert np.abs(x - rest)[:, axis - 1].max() <= 1e-14
+        assert shape_error(x, rest) <= 1e-12
+        error.append(np.abs(x - exact.apply(rest - FOOT) - FOOT).max())
+    assert found.history["kinetic"][-1] == pytest.approx((moment*time)**2/(2*inertia), rel=1e-3)
+    assert error[0]/error[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_wheel_on_its_axle_is_the_wheel_of_the_plane(tmp_path: Path) -> None:
+    """A pendulum that a moment drives to and fro: the motion of the same body of plane elements."""
+    step = ("*STEP, NLGEOM, INC=100\n*DYNAMIC, DIRECT\n.05, 5.\n"
+            "*DLOAD\nALL, GRAV, 5., 0., -1.\n*CLOAD, AMPLITUDE=SWAY\n9999, 6, .4\n*NODE FILE, FREQUENCY=10\nU\n*END STEP\n")
+    head = ("*AMPLITUDE, NAME=SWAY\n0., 0., 1., 1., 3., -1., 5., 0.\n", "*NODE\n9999, .3, 1.2\n*RIGID BODY, ELSET=ALL, REF NODE=9999\n"
+            "*BOUNDARY\n9999, 1, 2\n")
+    plane = (f"{head[0]}*NODE\n1, 0., 0.\n2, 1., 0.\n3, 1., .5\n4, 0., .5\n*ELEMENT, TYPE=CPE4, ELSET=ALL\n1, 1, 2, 3, 4\n"
+             f"*MATERIAL, NAME=M\n*DENSITY\n.5\n*SOLID SECTION, ELSET=ALL, MATERIAL=M\n1.\n{head[1]}{step}")
+    mesh = Block("C3D8", (1, 1, 1), (1.0, 0.5, 1.0))
+    space = head[0] + mesh.deck("", head[1].replace("1.2\n", "1.2, .5\n").replace("1, 2\n", "1, 5\n"), DENSITY) + step
+    one, two = run(plane, tmp_path/"plane").fields(), run(space, tmp_path/"space").fields()
+    corner = [int(np.flatnonzero(np.all(mesh.x == [*x, 0.0], 1))[0]) for x in one.x[:4]]
+    wanted = one["displacement"][:, :4, :2]
+    assert np.abs(wanted).max() > 0.5
+    assert np.abs(two["displacement"][:, corner, :2] - wanted).max() <= 1e-10
+
+
+def test_a_moment_bends_and_twists_a_bar(tmp_path: Path) -> None:
+    """By a rigid end that is free, or on an axle: supports balance the moment; what it turns by, prescribed, is the same state."""
+    mesh = Block("C3D8", (4, 2, 2), (4, 1, 1))
+    foot = "".join(f"{k}, 1, 3\n" for k in mesh.on(0, 0))
+    nodes = (f"*NODE\n{REFERENCE}, 5., .5, .5\n*NSET, NSET=END\n" + ",\n".join(map(str, mesh.on(0, 1)))
+             + f"\n*RIGID BODY, NSET=END, REF NODE={REFERENCE}\n")
+    step = "*STEP, NLGEOM\n*STATIC\n.25, 1.\n{}*NODE FILE\nU, RF\n*END STEP\n"
+    axle = f"{REFERENCE}, 1, 3\n{REFERENCE}, 5, 6\n"
+    loads = {"free": ("", [0.4, 1.2, -0.9]), "axle": (axle, [0.8, 0.0, 0.0])}
+    for name, (held, moment) in loads.items():
+        cards = "*CLOAD\n" + "".join(f"{REFERENCE}, {k}, {m!r}\n" for k, m in enumerate(moment, 4))
+        fields = run(mesh.deck(LAW, f"{nodes}*BOUNDARY\n{foot}{held}" + step.format(cards)), tmp_path/name).fields()
+        x, force = fields.x + fields["displacement"][-1], fields["reaction_force"][-1]
+        clamp = np.array(mesh.on(0, 0)) - 1
+        total = np.cross(x[clamp], force[clamp]).sum(0) + np.array(moment)
+        assert np.abs(total[:1] if held else total).max() <= 1e-9*np.abs(moment).max()
+        assert held or np.abs(force[clamp].sum(0)).max() <= 1e-9
+    u, end = fields["displacement"][-1], np.array(mesh.on(0, 1)) - 1
+    arm = mesh.x[end[0]] - [5.0, 0.5, 0.5]
+    turned = arm + u[end[0]]
+    angle = np.arctan2(*(np.cross(arm, turned)[0], arm[1:] @ turned[1:]))
+    assert angle > 0.2
+    given = step.format(f"*BOUNDARY\n{REFERENCE}, 4, 4, {float(angle)!r}\n")
+    again = run(mesh.deck(LAW, f"{nodes}*BOUNDARY\n{foot}{axle}" + given), tmp_path/"given").fields()["displacement"][-1]
+    assert np.abs(again[:len(mesh.x)] - u[:len(mesh.x)]).max() <= 1e-9
+
+
+def test_an_axle_is_let_go_and_held_again(tmp_path: Path) -> None:
+    """A step on the axle, one without it, one as it is then; and on from a prescribed turn about it."""
+    axle, go = f"*BOUNDARY\n{REFERENCE}, 1, 5\n", f"*BOUNDARY, OP=NEW\n{REFERENCE}, 1, 3\n"
+    fixed = f"*BOUNDARY, FIXED\n{REFERENCE}, 4, 6\n"
+    text, rest = top("C3D8", FOOT, TILT, np.array([0, 0, 1.5]), (0, 0, 0), "".join(
+        dynamic(0.05, 20, cards) for cards in (axle, go, fixed)))
+    found = run(text, tmp_path/"on")
+    x = found.fields().x[:len(rest)] + found.fields()["displacement"][:, :len(rest)]
+    assert np.abs(x[1] - x[0])[:, 2].max() <= 1e-13
+    assert np.abs(x[2] - x[1])[:, 2].max() > 0.1
+    assert np.abs(x[3] - x[2]).max() <= 1e-12
+    kinetic = found.history["kinetic"]
+    assert np.abs(kinetic[:21] - kinetic[0]).max() <= 1e-12*kinetic[0]
+    assert np.abs(kinetic[21:41] - kinetic[0]).max() <= 1e-12*kinetic[0]
+    text, rest = top("C3D8", FOOT, TILT, np.zeros(3), (0, 0, 0), f"*BOUNDARY\n{REFERENCE}, 1, 5\n"
+                     + dynamic(0.05, 20, f"*BOUNDARY, AMPLITUDE=RAMP\n{REFERENCE}, 6, 6, .5\n")
+                     + dynamic(0.05, 20, axle.replace("*BOUNDARY", "*BOUNDARY, OP=NEW")))
+    fields = run("*AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n" + text, tmp_path/"after").fields()
+    x = fields.x[:len(rest)] + fields["displacement"][:, :len(rest)]
+    for k, angle in ((1, 0.5), (2, 1.0)):
+        place = Rotation.from_rotvec([0, 0, angle]).apply(rest - FOOT) + FOOT
+        assert np.abs(x[k] - place).max() <= 1e-3, k
+
+
 @pytest.mark.parametrize(("cards", "text"), [
     (f"*BOUNDARY\n{REFERENCE}, 4\n", "degrees of freedom 4 to 6 of a rigid body are all prescribed"),
-    (f"*BOUNDARY, FIXED\n{REFERENCE}, 4\n*BOUNDARY\n{REFERENCE}, 5, 6\n", "or all FIXED"),
-    (f"*BOUNDARY\n{REFERENCE}, XSYMM\n", "single axes"),
+    (f"*BOUNDARY, FIXED\n{REFERENCE}, 4\n*BOUNDARY\n{REFERENCE}, 5, 6\n", "all FIXED"),
+    (f"*BOUNDARY\n{REFERENCE}, 4, 5, .1\n", "two of them are 0"),
     ("*BOUNDARY\n1, 5, 5, .1\n", "degrees of freedom 4 to 6 are of the reference node"),
-    (f"*CLOAD\n{REFERENCE}, 6, 1.\n", "degree of freedom 6 does not exist"),
+    ("*CLOAD\n1, 6, 1.\n", "no moment can act on node 1: degrees of freedom 4 to 6"),
+    (f"*CLOAD\n{REFERENCE}, 7, 1.\n", "degree of freedom 7 does not exist"),
+    (f"*CLOAD\n{REFERENCE}, 0, 0.\n", "degree of freedom"),
     ("*BOUNDARY\n1, 1, 3\n", "prescribe that node"),
     ("*NODE FILE\nUR\n", "rotation of rigid bodies in three dimensions is not in this version")])
 def test_what_is_refused(cards: str, text: str, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..plotting import RESOLUTION, WIDTH
 from ..scene import GREY, STYLE
@@ -22,6 +23,8 @@ from .report import Study, candidates, shown_measures
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _MARKS = "os^Dv<>"
 _PER_ROW = 3
+#: Numbers in each power of ten of an axis over less than a factor.
+_WITHIN = ((8.0, (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)), (50.0, (1.0, 2.0, 5.0)), (math.inf, (1.0,)))
 #: Inches: of a row of panels; beside, above and below a panel, for its labels; of the title of the
 #: figure, and of a row of the legend.
 _ROW, _LEFT, _RIGHT, _ABOVE, _BELOW, _TITLE, _LEGEND = 3.3, 0.8, 0.25, 0.3, 0.5, 0.35, 0.2
@@ -54,8 +57,10 @@ def _write(study: Study, reference: Reference, names: Sequence[str],
             drawer(axes, study, reference, name)
         for axes in panels[len(names):]:
             axes.set_axis_off()
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="lower center", ncols=_PER_LEGEND_ROW, frameon=False,
+        shown = {label: handle for axes in panels
+                 for handle, label in zip(*axes.get_legend_handles_labels())}
+        labels = [*shown]
+        figure.legend([*shown.values()], labels, loc="lower center", ncols=_PER_LEGEND_ROW, frameon=False,
                       fontsize=9)
         title = f"errors against {reference.kind}: {reference.title}"
         _arrange(figure, math.ceil(len(names)/_PER_ROW), math.ceil(len(labels)/_PER_LEGEND_ROW), title)
@@ -109,13 +114,23 @@ def _begin(axes: Axes, study: Study, reference: Reference, name: str,
         return False
     axes.set_xscale("log")
     axes.set_yscale("log")
+    _label(axes, [place(run) for run, _ in all_points])
     errors = [error for _, error in all_points]
     level = reference.uncertainty(name)
-    low = min([*errors, *([level] if level > 0.0 else [])])
-    axes.set_ylim(0.3*low, 3.0*max(*errors, low))
+    goals = [goal.tolerance for goal in study.goals if goal.name == name]
+    low = min([*errors, *goals, *([level] if level > 0.0 else [])])
+    axes.set_ylim(0.3*low, 3.0*max(*errors, *goals, low))
     _floor(axes, reference, name)
     axes.set_ylabel("relative error" if name not in OWN else "value; 0 is right")
     return True
+
+
+def _label(axes: Axes, places: Sequence[float]) -> None:
+    """Numbers below an axis: the fewer powers of ten it has, the more in each; none overlaps the next."""
+    longer = [within for length, within in _WITHIN if max(places) < length*min(places)]
+    axes.xaxis.set_major_locator(LogLocator(subs=longer[0]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_work(axes: Axes, study: Study, reference: Reference, name: str) -> None:
