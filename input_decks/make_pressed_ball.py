@@ -2,6 +2,7 @@
 
     python3 make_pressed_ball.py --output pressed_ball.inp
     python3 make_pressed_ball.py --plane --cells 6 --output pressed_plane.inp
+    python3 make_pressed_ball.py --mortar --output pressed_mortar.inp
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ UPPER_RIM, {face}
 *SURFACE, NAME=FLOOR, TYPE=ELEMENT
 {floor}
 *SURFACE INTERACTION, NAME=SMOOTH
-*CONTACT PAIR, INTERACTION=SMOOTH
+*CONTACT PAIR, INTERACTION=SMOOTH{kind}
 ROUND, FLOOR
 *BOUNDARY
 X0, 1
@@ -53,7 +54,7 @@ HIGH, 3, 3, <push>
 *NODE FILE
 U, RF
 *CONTACT FILE
-CF
+{asked}
 *END STEP
 """
 
@@ -66,6 +67,7 @@ def middle(part: Part, height: float) -> list[int]:
 def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("--plane", action="store_true", help="one ball, on a rigid plane")
+    parser.add_argument("--mortar", action="store_true", help="contact in the mean, with pressures")
     parser.add_argument("--cells", type=int, default=3, help="over the radius of the contact")
     options = parser.parse_args()
     pair = not options.plane
@@ -98,9 +100,10 @@ def main() -> None:
                                          if x[axis] == 0.0))
     lines += sets + comment("Material, contact, supports") + MODEL.strip().format(
         modulus=number(MODULUS), poisson=number(POISSON), lower=lower.name, floor=floor,
-        face=OUTER_FACE).splitlines()
+        face=OUTER_FACE, kind=", TYPE=MORTAR" if options.mortar else "").splitlines()
     lines += ["LOW, 3" if pair else "LOW, 1, 3"]
-    lines += comment("The run") + STEP.strip().splitlines()
+    lines += comment("The run") + STEP.strip().format(
+        asked="CF, CSTRESS" if options.mortar else "CF").splitlines()
     write_deck(lines, options.output)
 
 
