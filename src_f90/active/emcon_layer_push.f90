@@ -15,6 +15,7 @@ module emcon_layer_push
    use emcon_lapack, only : dense_solve
    use emcon_layer_type, only : layer_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_pushed_rows, only : pushed_rows_solve, pushed_rows_t
    use emcon_system, only : system_t, system_tangent_times
    use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_rub
    implicit none
@@ -28,6 +29,8 @@ module emcon_layer_push
    !> that leaves of rates is taken back so often.
    real(dp), parameter :: dependent = 1.0e4_dp*epsilon(1.0_dp)
    integer, parameter :: n_refine = 3
+   !> From so many closed contacts on a solution for each takes longer than a factor for all.
+   integer, parameter :: many_closed = 100
 
 contains
 
@@ -104,10 +107,14 @@ contains
          call constraints_evaluate(set, system, self%motion)
          call constraints_rows(set, system%space%numbering)
          call correction_lay_out(correction, system, set)
-         call correction_factorise(correction, system, set, is_singular, error)
-         if (allocated(error) .or. is_singular) return
          closed = pack([(k, k = 1, set%n)], abs(weight(set%id(:set%n))) > 0.0_wp)
          n = size(closed)
+         if (n > many_closed) then
+            call respond_at_once(self, weight, closed, y, mu, is_singular, error)
+            return
+         end if
+         call correction_factorise(correction, system, set, is_singular, error)
+         if (allocated(error) .or. is_singular) return
          allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n_row, 0:n))
          call pick_unknowns(system%space%numbering, self%push, residual)
          residual = -residual
@@ -128,6 +135,34 @@ contains
          mu = forces(:, 0) + matmul(forces(:, 1:), real(opening(:, 1), wp))
       end associate
    end subroutine respond_to
+
+   !> The same of many contacts that have closed: their forces are a load on a factor of its own.
+   subroutine respond_at_once(self, weight, closed, y, mu, is_singular, error)
+      type(layer_t), intent(inout) :: self       !! with rows that are laid out
+      real(wp), intent(in) :: weight(:)
+      integer, intent(in) :: closed(:)           !! (any) rows of the set
+      !> (n_unknown) [L], (n_row) [M L/T^2]; undefined where they are not found
+      real(wp), intent(inout), contiguous :: y(:), mu(:)
+      logical, intent(out) :: is_singular
+      type(error_t), allocatable, intent(out) :: error
+      type(pushed_rows_t) :: rows
+      real(wp) :: residual(size(y))
+
+      associate (set => self%active%set, system => self%system, &
+            correction => self%newton%correction)
+         is_singular = correction%n_redundant > 0
+         if (is_singular) return
+         rows%mu = 0.0_wp*mu
+         rows%mu(closed) = weight(set%id(closed))
+         rows%is_known = abs(rows%mu) > 0.0_wp
+         call pick_unknowns(system%space%numbering, self%push, residual)
+         call pushed_rows_solve(rows, system, set, correction, -residual, error)
+         is_singular = rows%is_singular
+         if (allocated(error) .or. is_singular) return
+         y = rows%y
+         mu = rows%mu
+      end associate
+   end subroutine respond_at_once
 
    !> The same where rows of the set follow from others, or nearly: all are condensed.
    subroutine respond_condensed(self, weight, y, mu, is_singular, error)

@@ -174,6 +174,7 @@ program main
    use test_row_order, only : collect_row_order
    use test_lane_sums, only : collect_lane_sums
    use test_mixing, only : collect_mixing
+   use test_pushed_rows, only : collect_pushed_rows
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
@@ -384,6 +385,7 @@ program main
    call run("contact_laws", collect_contact_laws)
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
+   call run("pushed_rows", collect_pushed_rows)
    call run("saddle_point", collect_saddle_point)
    call run("lane_sums", collect_lane_sums)
    call run("mixing", collect_mixing)
