@@ -23,6 +23,9 @@ module emcon_chosen_solver
    !> Steps for two digits of a body with mass, and for four of one without: with the number of
    !> unknowns along a side of it. A cube takes half as many, a slender body more.
    real(dp), parameter :: kept_steps = 7.0_dp, newton_steps = 4.0_dp
+   !> Of a matrix whose condition no mesh changes, as of mass: solutions, and steps to round-off.
+   integer, parameter :: even_solutions = 10
+   real(dp), parameter :: even_steps = 20.0_dp
    !> A solution may take as many steps as a factor costs, and these at any rate.
    integer, parameter :: least_steps = 200, most_steps = 10000
 
@@ -123,6 +126,10 @@ contains
       n_solution = real(merge(kept_solutions, newton_solutions, self%needs_halves), dp)
       n_step = kept_steps
       if (.not. self%needs_halves) n_step = newton_steps*real(n, dp)**(1.0_dp/3.0_dp)
+      if (self%is_even) then
+         n_solution = real(even_solutions, dp)
+         n_step = even_steps
+      end if
       takes_less = n_solution*n_step*step < self%n_operation/dense_gain &
          + n_solution*4.0_dp*real(self%n_factor, dp)
    end function takes_less

@@ -45,6 +45,8 @@ module emcon_sparse_solver
       logical :: is_converged = .true.
       !> Known after `analyse`: its halves are of a factor that half_scale*A is near to, no more
       logical :: is_incomplete = .false.
+      !> Set before `analyse`, with `accuracy`: iterations take about as many steps on any mesh
+      logical :: is_even = .false.
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
       integer, private :: of_analysis = 0     !! `n_analysis` when `factored` was factorised
       real(dp), allocatable, private :: factored(:)      !! values of the last `solver_renew`

@@ -80,6 +80,8 @@ contains
       integer :: n
 
       call solver_create(self%choice, matrix_definite, self%mass, self%user)
+      self%mass%accuracy = epsilon(1.0_dp)       ! nothing corrects a jump afterwards
+      self%mass%is_even = .true.
       n = system%space%numbering%n_unknown
       call terms_mass_values(system%term, value)
       call fill_massless(system%matrix, value)
