@@ -617,6 +617,42 @@ def test_impacts_with_restitution_and_friction(tmp_path: Path) -> None:
     dissipates(run)
 
 
+def stops_at(block: Block, corner: np.ndarray, v: np.ndarray, w: np.ndarray, e: float, mu: float) -> np.ndarray:
+    """The impulse by which friction stops a corner of a rigid block of density 1 that leaves with the part `e` of its speed."""
+    size, axes = np.linalg.norm(block.x[[1, 3, 4]] - block.x[0], axis=1), block.x[[1, 3, 4]] - block.x[0]
+    axes = axes/size[:, None]
+    mass = size.prod()
+    inverse = axes.T@np.diag(12/mass/(size@size - size**2))@axes
+    arm = np.cross(np.eye(3), corner - block.x.mean(0))                # the moment of a force is its rows' sum
+    rate = v + np.cross(w, corner - block.x.mean(0))
+    impulse = np.linalg.solve(np.eye(3)/mass + arm@inverse@arm.T, np.array([0, 0, -e*rate[2]]) - rate)
+    assert np.hypot(*impulse[:2]) < .9*mu*impulse[2]
+    return impulse
+
+
+@pytest.mark.parametrize(("turn", "v", "w", "e", "mu"), [
+    ((.2, .48), (-.74, -.75, -2.), (4.7, 2.7, 2.9), .3, .6), ((-.1, .3), (-1.9, 1., -2.), (-1.7, 2.9, -2.), .5, .8),
+    ((.3, .5), (.5, .2, -2.), (0., 0., 3.), .0, 1.)])
+def test_a_corner_that_lands_stops(turn: tuple, v: tuple, w: tuple, e: float, mu: float, tmp_path: Path) -> None:
+    """A rigid block lands on a corner, which sticks while the block goes on to turn: friction takes all of its velocity
+    along the surface, in whatever direction that is as the impact ends."""
+    (c, s), (d, t) = ((np.cos(a), np.sin(a)) for a in turn)
+    axes = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])@np.array([[d, 0, -t], [0, 1, 0], [t, 0, d]])
+    block = Block("C3D8", (1, 1, 1), size=(.6, .5, .4), place=lambda x: x@axes)
+    block.x[:, 2] += 1e-5 - block.x[:, 2].min()
+    text = (bodies([block], [faces(block)], STIFF) + rigid(1, block, v=v, w=w) + walls.wall(walls.plane())
+            + f"*SURFACE INTERACTION, NAME=I, RESTITUTION={e}\n*FRICTION\n{mu}\n*CONTACT PAIR, INTERACTION=I\nS1, W\n"
+            + f"*BOUNDARY\n{walls.FIXED}" + dynamic(1e-4, 3e-4))
+    run = ran(tmp_path, text)
+    impulse = stops_at(block, block.x[block.x[:, 2].argmin()], np.array(v), np.array(w), e, mu)
+    p = columns(run, "px py pz")
+    # The block turns by 6e-4 in an increment.
+    assert np.abs(p[-1] - p[0] - impulse).max() < 2e-3*np.abs(impulse).max()
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["jump_violation"] < 1e-10
+    dissipates(run)
+
+
 def test_a_restart_has_the_same_bits(tmp_path: Path) -> None:
     """Also of slips and tractions of faces, while the slab slides and turns."""
     (tmp_path/"whole").mkdir()
