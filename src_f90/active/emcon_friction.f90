@@ -442,9 +442,9 @@ contains
       if (missed <= round_off*maxval(system%response%rounding)) missed = 0.0_wp
    end subroutine friction_missed
 
-   !> How far Coulomb's cone is missed where velocities jump at the end of a step: by means over step
-   !> and jump, of friction over what pushes allow, or of what pulls [M L/T^2]. What gives back the
-   !> energy of balances without mass is left out: it is no force of contacts by themselves.
+   !> How far Coulomb's cone is missed where velocities jump at the end of a step: by means over the
+   !> step and the jump, of friction over what pushes allow, or of what pulls [M L/T^2]. What gives
+   !> back the energy of balances without mass is left out: it is no force of single contacts.
    pure real(wp) function friction_exceeded(self, set, h, jump) result(exceeded)
       type(friction_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set  !! of the step, solved

@@ -41,7 +41,7 @@ module emcon_rate_jump
       !> (0:n_slip, n) of gaps, and of slips the other way round, before [L/T]
       real(wp), allocatable :: rate(:, :)
       !> (n_slip, n) of slips the other way round: twice the mean rates that the step has with the
-      !> velocities before the jump [L/T]
+      !> velocities before the jump [L/T]; not allocated: what is free in the problem
       real(wp), allocatable :: mean(:, :)
       !> Allocated: the jump is for what friction stops by itself, at the end of the step
       type(stopping_t), allocatable :: stopping
@@ -176,11 +176,13 @@ contains
    pure subroutine measure_losses(jump, change)
       type(rate_jump_t), intent(inout) :: jump
       real(wp), intent(in) :: change(0:, :)      !! (0:n_slip, n) of rates by it [L/T]
-      real(wp) :: taken(size(jump%row)), moved
+      real(wp) :: taken(size(jump%row)), mean(jump%problem%n_slip, size(jump%row)), moved
 
       ! Slips are by half of the size of the step, so that they are twice their mean rates.
       associate (problem => jump%problem, more => jump%impulse, s => jump%problem%n_slip)
-         taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :))*(jump%mean + change(1:s, :)), 1)
+         mean = problem%free(1:s, :)
+         if (allocated(jump%mean)) mean = jump%mean
+         taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :))*(mean + change(1:s, :)), 1)
          jump%rubbed = taken - jump%taken
          jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
          moved = sum(abs(jump%rate) + abs(problem%free) + abs(change))
@@ -193,8 +195,10 @@ contains
             ! What friction seems to give comes from pushes: only the sum of both has a sign.
             call leave_to_friction(jump, taken, max(0.0_wp, -sum(jump%taken + jump%rubbed)))
             if (allocated(jump%part)) call leave_to_friction(jump, taken, min(0.0_wp, jump%lost))
-            ! Impulses are as exact as their problem is solved.
-            jump%is_done = min(jump%lost, sum(jump%taken + jump%rubbed)) >= -met*moved
+            ! Impulses are as exact as their problem is solved; what friction of the step takes
+            ! where nothing slides is round-off of slips.
+            jump%is_done = min(jump%lost, sum(jump%taken + jump%rubbed) + max(0.0_wp, &
+               -sum(jump%taken))) >= -met*moved
          end if
       end associate
    end subroutine measure_losses

@@ -92,8 +92,8 @@ contains
       if (allocated(error)) return
       is_done = jump%is_done .or. jump%is_idle
       if (.not. is_done .and. impacts%n_slip > 0) then
-         ! Newton's restitution and Coulomb's law make energy together. What keeps no rates makes none,
-         ! nor does the step, which keeps all, nor what lies between these.
+         ! Newton's restitution and Coulomb's law make energy together. What keeps no rates makes
+         ! none, nor does the step, which keeps all, nor what lies between these.
          call find_impacts(self, impacts, jump)
          call take_plastic(self, jump)
          call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &

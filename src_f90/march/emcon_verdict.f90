@@ -483,7 +483,8 @@ contains
       if (self%largest_push > 0.0_wp) missed = self%law_missed/self%largest_push
    end function verdict_law_violation
 
-   !> The same of Coulomb's cone, for means over increments with the jumps of velocity at their ends.
+   !> The same of Coulomb's cone, for means over increments with the jumps of velocity at their
+   !> ends.
    pure real(wp) function verdict_jump_violation(self) result(missed)
       type(verdict_t), intent(in) :: self
 

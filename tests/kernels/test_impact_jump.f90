@@ -1,5 +1,5 @@
-!> Impacts of a rigid slab on points of a plane, drawn at random: what is taken of the jump with which
-!> no rate is kept obeys Coulomb's law with the step before it, and takes energy.
+!> Impacts of a rigid slab on points of a plane, drawn at random: what is taken of the jump with
+!> which no rate is kept obeys Coulomb's law with the step before it, and takes energy.
 module test_impact_jump
    use, intrinsic :: iso_fortran_env, only : dp => real64
    use check, only : check_near, check_true, test_case_t
