@@ -111,7 +111,7 @@ contains
 
    !> The jump with which no contact keeps its rate, of which a part is taken: as much as a contact
    !> does not keep, by that which keeps most of those that move each other. Impulses are then
-   !> between those of the step and of that jump, and Coulomb's cone is convex, as kinetic energy is.
+   !> between those of the step and of that jump; Coulomb's cone is convex, as kinetic energy is.
    pure subroutine take_plastic(self, jump)
       type(march_t), intent(in) :: self
       type(rate_jump_t), intent(inout) :: jump   !! as `find_impacts` leaves it
