@@ -27,7 +27,7 @@ module emcon_active_set
    public :: active_set_pass, active_set_note_stale, active_set_brought, active_set_complete
    public :: active_set_may_turn, active_set_mixes, active_set_open_sets, active_set_repeats, &
       active_set_take, active_set_is_empty, &
-      active_set_slides, active_set_could_hold, active_set_mark
+      active_set_slides, active_set_could_hold, active_set_goes_on, active_set_mark
    public :: candidates_t, candidates_clear, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
@@ -523,6 +523,13 @@ contains
       self%n_stale = self%n_stale + 1
       status = merge(step_too_far, step_done, self%n_stale > most_stale)
    end subroutine active_set_note_stale
+
+   !> Has each solution of the increment asked for other stencils than it was found with?
+   pure logical function active_set_goes_on(self) result(goes_on)
+      type(active_set_t), intent(in) :: self
+
+      goes_on = self%n_stale > most_stale
+   end function active_set_goes_on
 
    !> Where a list is true.
    pure function places_of(is_meant) result(place)

@@ -17,10 +17,12 @@ module emcon_friction
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_fixes
    use emcon_system, only : system_t
+   use emcon_velocity_jumps, only : velocity_jump_t
    implicit none
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
-      friction_close, friction_turn, friction_use, friction_missed, friction_holds, &
+      friction_close, friction_turn, friction_use, friction_missed, friction_exceeded, &
+      friction_holds, &
       friction_look_back, friction_stiffness, friction_suit, friction_waits
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
@@ -442,6 +444,42 @@ contains
       ! Where nothing is loaded all forces are round-off.
       if (missed <= round_off*maxval(system%response%rounding)) missed = 0.0_wp
    end subroutine friction_missed
+
+   !> How far Coulomb's cone is missed where velocities jump at the end of a step: by means over the
+   !> step and the jump, of friction over what pushes allow, or of what pulls [M L/T^2]. What gives
+   !> back the energy of balances without mass is left out: it is no force of single contacts.
+   pure real(wp) function friction_exceeded(self, set, h, jump) result(exceeded)
+      type(friction_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set  !! of the step, solved
+      real(wp), intent(in) :: h                  !! of the step, > 0 [T]
+      type(velocity_jump_t), intent(in) :: jump(:)   !! (any)
+      real(wp) :: force(0:self%n_slip, set%n), push
+      integer :: k, place(size(self%law))
+
+      exceeded = 0.0_wp
+      if (.not. self%is_on .or. size(jump) == 0) return
+      place = 0
+      do k = set%n_permanent + 1, set%n
+         associate (item => set%item(k), all => condition_friction(set%item(k), set%lam(k)))
+            force(0, k) = set%lam(k)
+            force(1:, k) = all(:self%n_slip)
+            if (item%has_friction) place(set%id(k)) = k
+         end associate
+      end do
+      do k = 1, size(jump)
+         associate (own => place(jump(k)%id))
+            if (own == 0 .or. jump(k)%is_condensed) cycle
+            force(0, own) = force(0, own) + jump(k)%lam/h
+            force(1:, own) = force(1:, own) + jump(k)%drag(:self%n_slip)/h
+         end associate
+      end do
+      do k = set%n_permanent + 1, set%n
+         if (.not. set%item(k)%has_friction) cycle
+         push = set%item(k)%normal*force(0, k)
+         exceeded = max(exceeded, -push, norm2(force(1:, k)) - self%law(set%id(k))%mu*max(0.0_wp, &
+            push))
+      end do
+   end function friction_exceeded
 
    !> The largest normal force of contacts.
    pure real(wp) function largest_push(set) result(largest)

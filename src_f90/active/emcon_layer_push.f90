@@ -69,6 +69,7 @@ contains
          if (self%active%friction%is_on) call jumps_rub(self%jump, set, &
             drags(set, mu, self%active%friction%n_slip), 0.0_wp*mu(:set%n))
          self%jump%id = self%n_before + self%jump%id
+         self%jump%is_condensed = .true.
          call pick_unknowns(system%space%numbering, self%push, y)
          is_singular = maxval(abs(y)) > uncondensed*maxval(abs(self%push))
       end associate

@@ -7,7 +7,7 @@ module emcon_march_commit
    use emcon_contact_law, only : contact_laws_drag, loss_damping, loss_friction
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
-   use emcon_friction, only : friction_missed
+   use emcon_friction, only : friction_exceeded, friction_missed
    use emcon_friction_limit, only : friction_limit_tell
    use emcon_contact_support, only : contact_support_t
    use emcon_factor_policy, only : factor_policy_commit
@@ -226,6 +226,8 @@ contains
       increment%n_augmentation = max(increment%n_augmentation, self%active%penalty%n_augmentation)
       call friction_missed(self%active%friction, self%system, self%active%set, missed, largest)
       increment%law_missed = max(increment%law_missed, missed)
+      increment%jump_missed = max(increment%jump_missed, friction_exceeded(self%active%friction, &
+         self%active%set, h, self%end_state%jump))
       increment%largest_push = max(increment%largest_push, largest)
       increment%work_scale = hypot(increment%work_scale, work_scale(self))
    end subroutine tell_gaps

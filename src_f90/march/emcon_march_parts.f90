@@ -1,8 +1,9 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
-   use emcon_active_set, only : active_set_slides, step_cycling, step_diverged, step_done, &
-      step_not_held, step_loose, step_overlaps, step_passes_event, step_refused, step_rough, &
-      step_singular, step_stands_off, step_strikes, step_too_far, step_unbalanced
+   use emcon_active_set, only : active_set_goes_on, active_set_slides, step_cycling, &
+      step_diverged, step_done, step_loose, step_not_held, step_overlaps, step_passes_event, &
+      step_refused, step_rough, step_singular, step_stands_off, step_strikes, step_too_far, &
+      step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_evaluation, only : evaluation_has_inertia
    use emcon_kinds, only : wp
@@ -337,14 +338,19 @@ contains
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: nodes
+      character(len=:), allocatable :: nodes, remedy
 
       text = "a contact begins too deep or slides too far for one increment"
+      remedy = "give the other surface longer edges there"
+      if (active_set_goes_on(self%active)) then
+         text = "each solution of the increment meets other faces than it was found for"
+         remedy = "let the smaller surface be the slave, or take another TYPE of *CONTACT PAIR"
+      end if
       if (.not. any(self%active%candidates%is_blamed)) return
       call nodes_text(self, scene, self%active%candidates%is_blamed, nodes)
       text = text // ": slave nodes " // nodes
       if (.not. self%active%rules%may_cut) text = text // "; allow for smaller increments, or " // &
-         "give the other surface longer edges there"
+         remedy
    end subroutine too_far_text
 
    !> Why an increment with STABILIZE is to be smaller.

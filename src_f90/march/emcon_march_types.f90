@@ -70,6 +70,7 @@ module emcon_march_types
       !> Largest relative residual above Newton's tolerance that was accepted; 0: there is none.
       real(wp) :: unconverged = 0.0_wp
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
+      real(wp) :: jump_missed = 0.0_wp           !! with jumps of velocity, at most [M L/T^2]
       real(wp) :: largest_push = 0.0_wp          !! of contacts where there is friction [M L/T^2]
       real(wp) :: work_scale = 0.0_wp            !! nodal forces times coordinates [M L^2/T^2]
       type(notes_t) :: notes                     !! for the log

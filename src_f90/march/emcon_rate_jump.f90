@@ -4,7 +4,7 @@
 !> Source: docs/theory.md, eqs. (22e) and (22f).
 module emcon_rate_jump
    use emcon_constraints, only : constraint_set_t
-   use emcon_contact_parts, only : contact_parts_solve
+   use emcon_contact_parts, only : contact_parts_find, contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_map, &
       contact_problem_missed, contact_problem_t, met, nearly_met
    use emcon_errors, only : error_t
@@ -28,9 +28,8 @@ module emcon_rate_jump
       !> (0:n_slip, n) impulses of the step that stay
       logical, allocatable :: stays(:, :)
       logical, allocatable :: slides(:)          !! (n) on, unless the jump turns it back
-      !> (n_slip, n) of slips the other way round: what a stop takes, and twice the mean rates that
-      !> the step has with the velocities before the jump [L/T]
-      real(wp), allocatable :: rate(:, :), mean(:, :)
+      real(wp), allocatable :: rate(:, :)        !! (n_slip, n) of slips the other way round that a
+                                                 !! stop takes [L/T]
    end type stopping_t
 
    !> A jump that changes the rates of contacts by impulses along the gradients C of their gaps and
@@ -41,8 +40,14 @@ module emcon_rate_jump
       type(contact_problem_t) :: problem
       !> (0:n_slip, n) of gaps, and of slips the other way round, before [L/T]
       real(wp), allocatable :: rate(:, :)
+      !> (n_slip, n) of slips the other way round: twice the mean rates that the step has with the
+      !> velocities before the jump [L/T]; not allocated: what is free in the problem
+      real(wp), allocatable :: mean(:, :)
       !> Allocated: the jump is for what friction stops by itself, at the end of the step
       type(stopping_t), allocatable :: stopping
+      !> (n) allocated: of what laws say so much is taken, 0 to 1, the least of all that W couples;
+      !> what gaps take has no sign by itself then
+      real(wp), allocatable :: part(:)
       logical :: is_done = .false.               !! .false.: there is none to take, or it would make
                                                  !! energy
       logical :: is_idle = .false.               !! laws are met without it, to round-off
@@ -96,8 +101,21 @@ contains
       jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= rounded
       if (jump%is_idle) return
       call find_impulses(jump)
+      if (allocated(jump%part)) call take_parts(jump)
       if (jump%is_done) call measure_losses(jump, changes(jump))
    end subroutine rate_jump_solve
+
+   !> Leave of the impulses what is to be taken.
+   pure subroutine take_parts(jump)
+      type(rate_jump_t), intent(inout) :: jump
+      integer :: coupled(size(jump%row)), k
+
+      call contact_parts_find(jump%problem, coupled)
+      do k = 1, size(coupled)
+         jump%impulse(:, k) = minval(jump%part, coupled == coupled(k))*jump%impulse(:, k)
+      end do
+      jump%is_done = jump%is_done .and. any(jump%part > 0.0_wp)
+   end subroutine take_parts
 
    !> Impulses that obey the laws. A contact that slides on and that they would turn back is one to
    !> stop, too: there are ever more of these.
@@ -134,7 +152,7 @@ contains
       change = changes(jump)
       after = jump%rate + change
       turns_back = jump%stopping%slides .and. &
-         sum(after(1:, :)*(jump%stopping%mean + change(1:, :)), 1) < 0.0_wp
+         sum(after(1:, :)*(jump%mean + change(1:, :)), 1) < 0.0_wp
    end subroutine find_turning
 
    !> What the laws are missed by is left to rates: impulses are as Coulomb's law allows.
@@ -163,7 +181,7 @@ contains
       ! Slips are by half of the size of the step, so that they are twice their mean rates.
       associate (problem => jump%problem, more => jump%impulse, s => jump%problem%n_slip)
          mean = problem%free(1:s, :)
-         if (allocated(jump%stopping)) mean = jump%stopping%mean
+         if (allocated(jump%mean)) mean = jump%mean
          taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :))*(mean + change(1:s, :)), 1)
          jump%rubbed = taken - jump%taken
          jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
@@ -176,8 +194,11 @@ contains
          else
             ! What friction seems to give comes from pushes: only the sum of both has a sign.
             call leave_to_friction(jump, taken, max(0.0_wp, -sum(jump%taken + jump%rubbed)))
-            ! Impulses are as exact as their problem is solved.
-            jump%is_done = jump%lost >= -met*moved
+            if (allocated(jump%part)) call leave_to_friction(jump, taken, min(0.0_wp, jump%lost))
+            ! Impulses are as exact as their problem is solved; what friction of the step takes
+            ! where nothing slides is round-off of slips.
+            jump%is_done = min(jump%lost, sum(jump%taken + jump%rubbed) + max(0.0_wp, &
+               -sum(jump%taken))) >= -met*moved
          end if
       end associate
    end subroutine measure_losses

@@ -10,6 +10,7 @@ module emcon_restitution
    use emcon_constraints, only : constraint_index
    use emcon_contact_law, only : contact_laws_rate_change
    use emcon_contact_problem, only : contact_problem_create
+   use emcon_coulomb_law, only : coulomb_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
@@ -81,7 +82,6 @@ contains
       logical, intent(out) :: is_done            !! and friction stops what slides
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
-      type(impacts_t) :: along_gaps
       type(rate_jump_t) :: jump
 
       is_done = .false.
@@ -92,14 +92,15 @@ contains
       if (allocated(error)) return
       is_done = jump%is_done .or. jump%is_idle
       if (.not. is_done .and. impacts%n_slip > 0) then
-         ! Along normals alone it makes no energy where all keep the same part.
-         along_gaps = impacts
-         along_gaps%n_slip = 0
-         call find_impacts(self, along_gaps, jump)
+         ! Newton's restitution and Coulomb's law make energy together. What keeps no rates makes
+         ! none, nor does the step, which keeps all, nor what lies between these.
+         call find_impacts(self, impacts, jump)
+         call take_plastic(self, jump)
          call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
             self%end_state%v, error)
          if (allocated(error)) return
       end if
+      is_done = jump%is_done .or. jump%is_idle
       if (jump%is_done) then
          call book_jump(self, jump)
       else if (.not. jump%is_idle) then
@@ -107,6 +108,32 @@ contains
             // "RESTITUTION says: with it they would gain energy")
       end if
    end subroutine change_pushes
+
+   !> The jump with which no contact keeps its rate, of which a part is taken: as much as a contact
+   !> does not keep, by that which keeps most of those that move each other. Impulses are then
+   !> between those of the step and of that jump; Coulomb's cone is convex, as kinetic energy is.
+   pure subroutine take_plastic(self, jump)
+      type(march_t), intent(in) :: self
+      type(rate_jump_t), intent(inout) :: jump   !! as `find_impacts` leaves it
+      real(wp) :: kept                           ! of a rate along the surface
+      integer :: k, i, pair
+
+      associate (set => self%active%set, problem => jump%problem)
+         allocate(jump%part(size(jump%row)))
+         do k = 1, size(jump%row)
+            call constraint_index(self%system, set%id(jump%row(k)), pair, i)
+            jump%part(k) = -contact_laws_rate_change(self%system%contact(pair)%contact%laws, 1.0_wp)
+            problem%free(0, k) = jump%rate(0, k)
+            if (.not. set%item(jump%row(k))%has_friction) cycle
+            kept = self%active%friction%law(set%id(jump%row(k)))%restitution
+            if (stops_by_rate(self, jump, k)) then
+               problem%free(1:, k) = jump%rate(1:, k)
+            else if (kept < 1.0_wp) then
+               problem%slip_target(:, k) = problem%slip_target(:, k)/(1.0_wp - kept)
+            end if
+         end do
+      end associate
+   end subroutine take_plastic
 
    !> Energies of a jump that was taken, beside that of friction.
    pure subroutine book(self, lost, gained)
@@ -170,7 +197,7 @@ contains
          jump%row = pack([(k, k = 1, set%n)], has_impact(self))
          call contact_problem_create(jump%problem, impacts%n_slip, size(jump%row))
          allocate(jump%rate(0:impacts%n_slip, size(jump%row)), jump%taken(size(jump%row)), &
-            source=0.0_wp)
+            jump%mean(impacts%n_slip, size(jump%row)), source=0.0_wp)
          do k = 1, size(jump%row)
             id = set%id(jump%row(k))
             call constraint_index(self%system, id, pair, i)
@@ -209,13 +236,30 @@ contains
                - 2.0_wp/impacts%h*item%slip(s)
             problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_to_stop(s)
          end do
-         if (problem%n_slip > 1 .and. (law%holds_slip() &
-            .or. any(abs(law%slip_to_stop) > 0.0_wp))) then
-            problem%slip_target(:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k) &
-            - problem%free(1:, k)
-         end if
+         jump%mean(:, k) = problem%free(1:, k)
+         if (.not. stops_by_rate(self, jump, k)) return
+         problem%free(1:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
+         problem%slip_target(:, k) = 0.0_wp
       end associate
    end subroutine find_rubbing
+
+   !> Does the contact at place `k` stop or stick by its rate at the end?
+   pure logical function stops_by_rate(self, jump, k)
+      type(march_t), intent(in) :: self
+      type(rate_jump_t), intent(in) :: jump
+      integer, intent(in) :: k                   !! it has friction
+
+      stops_by_rate = jump%problem%n_slip > 1
+      if (stops_by_rate) stops_by_rate = may_stop( &
+         self%active%friction%law(self%active%set%id(jump%row(k))))
+   end function stops_by_rate
+
+   !> Did it stick in the step, or would that turn it back?
+   pure logical function may_stop(law)
+      type(coulomb_t), intent(in) :: law
+
+      may_stop = law%holds_slip() .or. any(abs(law%slip_to_stop) > 0.0_wp)
+   end function may_stop
 
    !> Friction stops what the step would turn back, by what pushes allow: its impulses take all of
    !> the rate along the surface, or are opposite to what is left of that. Pushes change so that
@@ -233,7 +277,6 @@ contains
          allocate(jump%stopping%stays(0:problem%n_slip, n), source=pushes_stay)
          allocate(jump%stopping%slides(n), source=.false.)
          jump%stopping%rate = jump%rate(1:, :)
-         jump%stopping%mean = problem%free(1:, :)
          do k = 1, n
             if (self%active%set%item(jump%row(k))%has_friction) call find_stop(self, h, jump, k)
          end do
@@ -254,7 +297,7 @@ contains
          is_led = any(abs(law%slip_target) > 0.0_wp)
          problem%slip_target(:, k) = 2.0_wp/h*law%slip_target(:problem%n_slip)
          stopping%rate(:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
-         if (.not. is_led .and. (law%holds_slip() .or. any(abs(law%slip_to_stop) > 0.0_wp))) then
+         if (.not. is_led .and. may_stop(law)) then
             stopping%stays(1:, k) = .false.
             problem%free(1:, k) = stopping%rate(:, k)
          else if (stopping%stays(0, k)) then

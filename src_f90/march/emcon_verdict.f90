@@ -29,7 +29,7 @@ module emcon_verdict
    implicit none
    private
    public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
-      verdict_is_good, verdict_is_failure, verdict_law_violation
+      verdict_is_good, verdict_is_failure, verdict_jump_violation, verdict_law_violation
 
    !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
    !> the digits are left.
@@ -88,6 +88,7 @@ module emcon_verdict
       type(nodal_pull_t) :: nodal_pull
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
+      real(wp) :: jump_missed = 0.0_wp           !! with jumps of velocity, at most [M L/T^2]
       real(wp) :: largest_push = 0.0_wp          !! of contacts where there is friction [M L/T^2]
       type(penalty_found_t) :: penalty
       type(verdict_counts_t) :: count
@@ -171,6 +172,7 @@ contains
          self%has_massless = self%has_massless .or. &
             step_initiation(scene%step(state%clock%i_step)) == initiation_massless
          self%law_missed = max(self%law_missed, increment%law_missed)
+         self%jump_missed = max(self%jump_missed, increment%jump_missed)
          self%largest_push = max(self%largest_push, increment%largest_push)
          call scatter_follow(self%scatter, state%sums%sum, &
             evaluation_has_inertia(march%motion%evaluation))
@@ -368,6 +370,9 @@ contains
       if (verdict_law_violation(self) > law_bar) call note_add(self%reasons, &
          "the laws of contact and friction are violated by " // &
          to_text(verdict_law_violation(self), 3) // " of the largest force")
+      if (verdict_jump_violation(self) > law_bar) call note_add(self%reasons, &
+         "where velocities jump the law of friction is violated by " // &
+         to_text(verdict_jump_violation(self), 3) // " of the largest force")
       if (self%unconverged > half_digits) call note_add(self%reasons, "a residual of " // &
          to_text(self%unconverged, 3) // " was accepted at time " // &
          to_text(self%unconverged_time, 9))
@@ -477,5 +482,14 @@ contains
       missed = 0.0_wp
       if (self%largest_push > 0.0_wp) missed = self%law_missed/self%largest_push
    end function verdict_law_violation
+
+   !> The same of Coulomb's cone, for means over increments with the jumps of velocity at their
+   !> ends.
+   pure real(wp) function verdict_jump_violation(self) result(missed)
+      type(verdict_t), intent(in) :: self
+
+      missed = 0.0_wp
+      if (self%largest_push > 0.0_wp) missed = self%jump_missed/self%largest_push
+   end function verdict_jump_violation
 
 end module emcon_verdict

@@ -12,7 +12,8 @@ module emcon_verdict_file
    use emcon_stand_off, only : stand_off_mean
    use emcon_step_control, only : control_sizes, n_why, step_control_t, why_text
    use emcon_text, only : notes_t, string_t
-   use emcon_verdict, only : verdict_end, verdict_is_good, verdict_law_violation, verdict_t
+   use emcon_verdict, only : verdict_end, verdict_is_good, verdict_jump_violation, &
+      verdict_law_violation, verdict_t
    use emcon_version, only : precision_names, this_precision
    implicit none
    private
@@ -100,8 +101,10 @@ contains
          call json_number(line, "give", self%penalty%give)
          call json_number(line, "give_time", self%penalty%time)
       end if
-      if (march%active%friction%is_on) call json_number(line, "law_violation", &
-         verdict_law_violation(self))
+      if (march%active%friction%is_on) then
+         call json_number(line, "law_violation", verdict_law_violation(self))
+         call json_number(line, "jump_violation", verdict_jump_violation(self))
+      end if
       if (self%penalty%most_augmentations > 0) call json_number(line, "augmentations", &
          real(self%penalty%most_augmentations, wp))
       call add_forces(self, line)
@@ -176,6 +179,7 @@ contains
       if (restart_offers(restart, "law_missed", self%largest_push > 0.0_wp)) then
          call restart_exchange(restart, "law_missed", self%law_missed)
          call restart_exchange(restart, "law_missed", self%largest_push)
+         call restart_exchange(restart, "law_missed", self%jump_missed)
       end if
       if (restart_offers(restart, "nodal_pull", self%nodal_pull%force > 0.0_wp)) then
          call restart_exchange(restart, "nodal_pull", self%nodal_pull%pull)

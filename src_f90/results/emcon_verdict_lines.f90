@@ -14,7 +14,7 @@ module emcon_verdict_lines
    use emcon_stand_off, only : stand_off_mean
    use emcon_step_control, only : control_sizes, n_why, why_text
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
-   use emcon_verdict, only : verdict_law_violation, verdict_t
+   use emcon_verdict, only : verdict_jump_violation, verdict_law_violation, verdict_t
    implicit none
    private
    public :: verdict_balance_lines, verdict_line, guard_advice
@@ -176,7 +176,8 @@ contains
          to_text(ledger%damping, 9))
       if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took " // &
          to_text(ledger%friction, 9) // "; friction law satisfied to " // &
-         to_text(verdict_law_violation(self), 2) // " of the largest force")
+         to_text(verdict_law_violation(self), 2) // " of the largest force, " // &
+         to_text(verdict_jump_violation(self), 2) // " with jumps of velocity")
       if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
          to_text(ledger%contact_damping, 9))
       if (self%penalty%give > 0.0_wp) call note_add(lines, "largest penetration of contact " // &

@@ -23,6 +23,7 @@ module emcon_velocity_jumps
       real(wp), allocatable :: slave_moment(:), master_moment(:)   !! (1 or 3)
       real(wp) :: drag(most_slips) = 0.0_wp      !! of friction, against slips [M L/T]
       real(wp) :: rubbed = 0.0_wp                !! what friction takes more by it [M L^2/T^2]
+      logical :: is_condensed = .false.          !! through what has no mass, which balances it
    end type velocity_jump_t
 
 contains

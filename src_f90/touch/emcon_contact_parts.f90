@@ -12,7 +12,7 @@ module emcon_contact_parts
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: contact_parts_solve
+   public :: contact_parts_solve, contact_parts_find
 
 contains
 
@@ -33,7 +33,7 @@ contains
       logical :: is_own
 
       part = 1
-      if (self%n_slip > 1 .and. any(self%mu > 0.0_wp)) call find_parts(self, part)
+      if (self%n_slip > 1 .and. any(self%mu > 0.0_wp)) call contact_parts_find(self, part)
       if (all(part == 1)) then
          call contact_problem_solve(self, push, effort, is_solved, near_enough, slope, stays_near)
          return
@@ -55,7 +55,7 @@ contains
    end subroutine contact_parts_solve
 
    !> Number the parts that W couples, from 1 on.
-   pure subroutine find_parts(self, part)
+   pure subroutine contact_parts_find(self, part)
       type(contact_problem_t), intent(in) :: self
       integer, intent(out) :: part(:)                !! (n)
       integer :: waiting(size(part)), n_waiting, n_part, first, i, k
@@ -80,7 +80,7 @@ contains
             end do
          end do
       end do
-   end subroutine find_parts
+   end subroutine contact_parts_find
 
    !> Do the forces of contact `k` move contact `i`?
    pure logical function moves(self, i, k)

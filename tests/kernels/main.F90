@@ -64,6 +64,7 @@ program main
    use test_velocity_jumps, only : collect_velocity_jumps
    use test_velocity_pushes, only : collect_velocity_pushes
    use test_stopping_jump, only : collect_stopping_jump
+   use test_impact_jump, only : collect_impact_jump
    use test_near_list, only : collect_near_list
    use test_common_normal, only : collect_common_normal
    use test_corner_tops, only : collect_corner_tops
@@ -411,6 +412,7 @@ program main
    call run("velocity_jumps", collect_velocity_jumps)
    call run("velocity_pushes", collect_velocity_pushes)
    call run("stopping_jump", collect_stopping_jump)
+   call run("impact_jump", collect_impact_jump)
    call run("near_list", collect_near_list)
    call run("common_normal", collect_common_normal)
    call run("corner_tops", collect_corner_tops)

@@ -98,7 +98,7 @@ contains
       if (allocated(error)) return
       call check_near(error, rates(slab, jump, 1), spread(0.0_wp, 1, 3), tol, 1.0_wp, "it stops")
       do k = 2, 3
-         mean = -0.5_wp*(jump%stopping%mean(:, k) + matmul(jump%problem%w(3*k - 1:3*k, :), &
+         mean = -0.5_wp*(jump%mean(:, k) + matmul(jump%problem%w(3*k - 1:3*k, :), &
             reshape(jump%impulse, [9])))
          force = force_of(jump, k)
          call check_near(error, force(1:), slab%mu(k)*force(0)*mean/norm2(mean), tol, 1.0_wp, &
@@ -198,7 +198,7 @@ contains
       allocate(jump%stopping%stays(0:2, n), source=pushes_stay)
       jump%stopping%slides = .not. slab%stops .and. .not. pushes_stay
       jump%stopping%rate = -slips(slab)
-      jump%stopping%mean = -2.0_wp*slab%mean
+      jump%mean = -2.0_wp*slab%mean
       associate (problem => jump%problem)
          do k = 1, n
             row(:, 1, k) = row_of(slab%at(:, k), [0.0_wp, 0.0_wp, 1.0_wp])
@@ -212,7 +212,7 @@ contains
             problem%base(1:, k) = slab%mu(k)*slab%push(k)*slab%mean(:, k)/norm2(slab%mean(:, k))
             if (present(part)) problem%base(1:, k) = part*problem%base(1:, k)
             jump%taken(k) = dot_product(problem%base(1:, k), slab%mean(:, k))
-            problem%free(1:, k) = jump%stopping%mean(:, k)
+            problem%free(1:, k) = jump%mean(:, k)
             if (slab%stops(k)) then
                problem%free(1:, k) = jump%rate(1:, k)
                jump%stopping%stays(1:, k) = .false.

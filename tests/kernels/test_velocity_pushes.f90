@@ -230,7 +230,7 @@ contains
       allocate(jump%stopping%stays(0:1, 3), source=.true.)
       jump%stopping%stays(1, 2) = .false.
       jump%stopping%slides = spread(.false., 1, 3)
-      allocate(jump%stopping%rate(1, 3), jump%stopping%mean(1, 3), source=0.0_wp)
+      allocate(jump%stopping%rate(1, 3), jump%mean(1, 3), source=0.0_wp)
       jump%rate(1, 2) = slip
       jump%problem%free(1, 2) = slip
       jump%problem%base(0, :) = [8.0_wp, 8.0_wp, pull]
