@@ -453,11 +453,21 @@ contains
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
       real(wp), intent(in) :: h                  !! of the step, > 0 [T]
       type(velocity_jump_t), intent(in) :: jump(:)   !! (any)
+
+      exceeded = 0.0_wp
+      if (self%is_on .and. size(jump) > 0) exceeded = exceeded_by_jumps(self, set, h, jump)
+   end function friction_exceeded
+
+   !> The same of some jumps.
+   pure real(wp) function exceeded_by_jumps(self, set, h, jump) result(exceeded)
+      type(friction_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: h
+      type(velocity_jump_t), intent(in) :: jump(:)
       real(wp) :: force(0:self%n_slip, set%n), push
       integer :: k, place(size(self%law))
 
       exceeded = 0.0_wp
-      if (.not. self%is_on .or. size(jump) == 0) return
       place = 0
       do k = set%n_permanent + 1, set%n
          associate (item => set%item(k), all => condition_friction(set%item(k), set%lam(k)))
@@ -479,7 +489,7 @@ contains
          exceeded = max(exceeded, -push, norm2(force(1:, k)) - self%law(set%id(k))%mu*max(0.0_wp, &
             push))
       end do
-   end function friction_exceeded
+   end function exceeded_by_jumps
 
    !> The largest normal force of contacts.
    pure real(wp) function largest_push(set) result(largest)

@@ -492,7 +492,7 @@ def test_what_it_is_is_said_in_a_line(run: Path) -> None:
     same = emcon.compare(run, run)
     assert repr(same).endswith("largest relative difference 0.00e+00")
     mesh = emcon.mesh.block((0.0, 0.0), (1.0, 1.0), (2, 2))
-    assert repr(emcon.Model.from_mesh(mesh)).endswith("1 ELSET, 4 SURFACE)")
+    assert repr(emcon.Model.from_mesh(mesh)).endswith("2 ELSET, 4 SURFACE)")
     assert repr(emcon.Model("a")) == "Model(1 HEADING)"
     with emcon.Stepper(PACKAGE.parent/"input_decks"/"tumbling_block.inp") as block:
         (body,) = block.bodies()

@@ -403,7 +403,7 @@ def on_each_other(folder: Path, blocks: list[Block], pairs: list[tuple[int, int]
     return run
 
 
-@pytest.mark.parametrize(("count", "until"), [(3, 2.0), pytest.param(20, 6.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("count", "until"), [(3, 2.5), pytest.param(20, 6.0, marks=pytest.mark.long)])
 def test_dominoes_fall_one_after_the_other(count: int, until: float, tmp_path: Path) -> None:
     """The first one is pushed over, with a restitution of one half. Fallen, all lie still."""
     blocks = [Block("C3D8", (1, 1, 1), size=(.2, .5, 1), place=lambda x, i=i: x + np.array([.5*i - .1, -.25, 0]))

@@ -104,7 +104,7 @@ def a_support_that_turns(case: Case) -> str:
 def no_such_freedom(case: Case) -> str:
     dof = case.chance.choice([0, 4, 7, -1])
     case.step = f"*CLOAD\n{case.nodes[0]}, {dof}, 1.\n"
-    return f"degree of freedom {dof}|the degree of freedom '{dof}' is not positive"
+    return f"degree of freedom {dof}|the degree of freedom '{dof}' is not positive|no moment can act"
 
 
 def contact(case: Case) -> str:
