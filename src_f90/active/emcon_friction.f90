@@ -22,8 +22,8 @@ module emcon_friction
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
       friction_close, friction_turn, friction_use, friction_missed, friction_exceeded, &
-      friction_holds, &
-      friction_look_back, friction_stiffness, friction_suit, friction_waits
+      friction_find_bound, friction_holds, friction_look_back, friction_stiffness, friction_suit, &
+      friction_waits
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -184,7 +184,7 @@ contains
       leads = .false.
       if (evaluation_is_equilibrium(motion%evaluation)) return
       takes_jumps = evaluation_contact_conserves(motion%evaluation)
-      call find_bound(system, set, is_bound)
+      call friction_find_bound(system, set, is_bound)
       du = evaluation_displacement(motion%evaluation, motion%v0, 0.0_wp)
       do k = set%n_permanent + 1, set%n
          call constraint_index(system, set%id(k), pair, i)
@@ -207,9 +207,9 @@ contains
 
    !> Nodes that permanent conditions bind, as those of rigid bodies do their frames, nodes that
    !> follow from these alone, and nodes that are held in all directions.
-   pure subroutine find_bound(system, set, is_bound)
+   pure subroutine friction_find_bound(system, set, is_bound)
       type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(in) :: set
+      type(constraint_set_t), intent(in) :: set  !! selected
       logical, intent(out) :: is_bound(:)        !! (n_node)
       logical :: binds(0:system%space%numbering%n_unknown)   ! (0: what is prescribed)
       integer :: i, k, n_dim
@@ -228,7 +228,7 @@ contains
                numbering%start(n_dim*i + 1))))
          end do
       end associate
-   end subroutine find_bound
+   end subroutine friction_find_bound
 
    !> Contacts whose slave node is held in some direction, and which nothing that is free to move
    !> makes slide, as on a line of symmetry, do not rub: any friction would satisfy the law there,

@@ -43,6 +43,8 @@ module emcon_rate_jump
       !> (n_slip, n) of slips the other way round: twice the mean rates that the step has with the
       !> velocities before the jump [L/T]; not allocated: what is free in the problem
       real(wp), allocatable :: mean(:, :)
+      !> (n) contacts of rigid bodies in space: what stops or sticks does so by its rate at the end
+      logical, allocatable :: by_rate(:)
       !> Allocated: the jump is for what friction stops by itself, at the end of the step
       type(stopping_t), allocatable :: stopping
       !> (n) allocated: of what laws say so much is taken, 0 to 1, the least of all that W couples;

@@ -12,6 +12,7 @@ module emcon_restitution
    use emcon_contact_problem, only : contact_problem_create
    use emcon_coulomb_law, only : coulomb_t
    use emcon_errors, only : error_t
+   use emcon_friction, only : friction_find_bound
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_is_at
@@ -126,8 +127,10 @@ contains
             problem%free(0, k) = jump%rate(0, k)
             if (.not. set%item(jump%row(k))%has_friction) cycle
             kept = self%active%friction%law(set%id(jump%row(k)))%restitution
-            if (stops_by_rate(self, jump, k)) then
+            if (stops(self, jump, k) .and. jump%by_rate(k)) then
                problem%free(1:, k) = jump%rate(1:, k)
+            else if (stops(self, jump, k)) then
+               problem%slip_target(:, k) = jump%rate(1:, k) - jump%mean(:, k)
             else if (kept < 1.0_wp) then
                problem%slip_target(:, k) = problem%slip_target(:, k)/(1.0_wp - kept)
             end if
@@ -191,6 +194,7 @@ contains
       type(march_t), intent(in) :: self
       type(impacts_t), intent(in) :: impacts
       type(rate_jump_t), intent(out) :: jump
+      logical :: is_bound(size(self%end_state%v, 2))
       integer :: k, id, i, pair
 
       associate (set => self%active%set)
@@ -198,8 +202,13 @@ contains
          call contact_problem_create(jump%problem, impacts%n_slip, size(jump%row))
          allocate(jump%rate(0:impacts%n_slip, size(jump%row)), jump%taken(size(jump%row)), &
             jump%mean(impacts%n_slip, size(jump%row)), source=0.0_wp)
+         allocate(jump%by_rate(size(jump%row)), source=.false.)
+         if (impacts%n_slip > 1) call friction_find_bound(self%system, set, is_bound)
          do k = 1, size(jump%row)
             id = set%id(jump%row(k))
+            associate (item => set%item(jump%row(k)))
+               if (impacts%n_slip > 1) jump%by_rate(k) = all(is_bound(item%node(:item%n_node)))
+            end associate
             call constraint_index(self%system, id, pair, i)
             jump%rate(0, k) = condition_rate(set%item(jump%row(k)), self%end_state%v)
             jump%problem%free(0, k) = -contact_laws_rate_change( &
@@ -214,8 +223,9 @@ contains
 
    !> The same along the surface, for place `k` of the jump. Slips are by half of the size of the
    !> step: twice their mean rates, so that what changes a rate at the end changes them by as much.
-   !> In space what stops or sticks does so by its rate at the end, as in a stop without impact:
-   !> slips of a rigid body over a step disagree by the square of its turn, rates do not.
+   !> In space what stops or sticks on rigid bodies does so by its rate at the end, as in a stop
+   !> without impact: slips of a rigid body over a step disagree by the square of its turn, rates do
+   !> not. That of elastic bodies is led there, so that friction takes energy at each node.
    pure subroutine find_rubbing(self, impacts, jump, k)
       type(march_t), intent(in) :: self
       type(impacts_t), intent(in) :: impacts
@@ -237,22 +247,26 @@ contains
             problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_to_stop(s)
          end do
          jump%mean(:, k) = problem%free(1:, k)
-         if (.not. stops_by_rate(self, jump, k)) return
-         problem%free(1:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
-         problem%slip_target(:, k) = 0.0_wp
+         if (.not. stops(self, jump, k)) return
+         if (jump%by_rate(k)) then
+            problem%free(1:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
+            problem%slip_target(:, k) = 0.0_wp
+         else
+            problem%slip_target(:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k) &
+               - problem%free(1:, k)
+         end if
       end associate
    end subroutine find_rubbing
 
-   !> Does the contact at place `k` stop or stick by its rate at the end?
-   pure logical function stops_by_rate(self, jump, k)
+   !> Does the contact at place `k` stop or stick, in space?
+   pure logical function stops(self, jump, k)
       type(march_t), intent(in) :: self
       type(rate_jump_t), intent(in) :: jump
       integer, intent(in) :: k                   !! it has friction
 
-      stops_by_rate = jump%problem%n_slip > 1
-      if (stops_by_rate) stops_by_rate = may_stop( &
-         self%active%friction%law(self%active%set%id(jump%row(k))))
-   end function stops_by_rate
+      stops = jump%problem%n_slip > 1
+      if (stops) stops = may_stop(self%active%friction%law(self%active%set%id(jump%row(k))))
+   end function stops
 
    !> Did it stick in the step, or would that turn it back?
    pure logical function may_stop(law)
