@@ -157,7 +157,8 @@ APP_LIBS = $(LAPACK_LIBS) $(if $(filter file,$(origin HDF5_LIBS)),$(HDF5_APP_LIB
 FFLAGS_OF_holder := -O0 -g1
 
 # Sources without a tag in rooms that read decks, write results and hand calls on (module_order.py
-# names them): nothing in them is repeated for each element or contact. They take a third less of the time to compile than by -O2.
+# names them): nothing in them is repeated for each element or contact. They take a third less of
+# the time to compile than by -O2.
 # -Wno-uninitialized: by -O1 gfortran 12 warns falsely of functions of arrays too.
 FFLAGS_OF_outer := -O1 -g1 -Wno-uninitialized
 

@@ -113,3 +113,13 @@ def test_crowds_in_space(seed, tmp_path):
     if "*STATIC" in scene(seed):
         run.fields()["reaction_force"][-1] *= 1.01
     assert judge_crowd(run, scene(seed)) != []
+
+
+def test_a_crowd_in_space_that_rubs(tmp_path):
+    """Friction takes energy at each elastic node, also in increments at the end of which it stops rigid bodies."""
+    text = scene(36, friction=True)
+    assert "RIGID BODY" in text
+    deck = tmp_path / "scene.inp"
+    deck.write_text(text)
+    run = run_deck(deck, tmp_path)
+    assert run.verdict["verdict"] == "good" and judge_crowd(run, text) == []
