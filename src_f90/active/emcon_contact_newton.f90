@@ -51,9 +51,8 @@ module emcon_contact_newton
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
    !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
-   !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
-   !> solution for each row. And in statics they are stiff only where nothing else holds a
-   !> body: without that, pushes are found of rows that follow from others.
+   !> In statics so many rows are stiff in the tangent only where nothing else holds a body: without
+   !> that, pushes are found of rows that follow from others.
    integer, parameter :: many = 100
    !> The tangent of an iterate does for the next one if that leaves less than this part; a factor
    !> that is kept does with new rows if less than that is left.
@@ -239,7 +238,7 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
 
-      may_keep = set%n_row >= many .and. factor_policy_may_provide(newton%factor_policy) .and. &
+      may_keep = factor_policy_may_provide(newton%factor_policy) .and. &
          .not. (self%holds .or. self%is_driven .or. self%has_tangent)
       if (may_keep) may_keep = kept_factor_has_room(newton%correction%kept, set%n_row, &
          size(system%matrix%column))

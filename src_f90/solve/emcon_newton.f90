@@ -110,7 +110,7 @@ contains
 
    !> Solve for `motion%du`, whose prescribed entries stand; on entry a first guess. The multipliers
    !> of `set` start from what they are. By a kept factor where that leads to the end, else by
-   !> tangents.
+   !> tangents, unless its policy is to make none.
    subroutine newton_solve(self, system, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -130,6 +130,8 @@ contains
          status, is_done, error)
       if (is_done .or. allocated(error)) return
       if (set%n > 0) set%lam = lam
+      status = newton_diverged
+      if (self%factor_policy%is_alone) return
       call solve_by_tangents(self, system, set, motion, status, error)
    end subroutine newton_solve
 
