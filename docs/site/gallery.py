@@ -20,7 +20,7 @@ PROGRAM = ROOT/"build"/"release"/"emcon"
 
 #: Decks by what they show; those that are not named stand last.
 CHAPTERS = {
-    "Parts of machines": "snap_fit seal wheel press_fit roller pressed_ball linked_rings",
+    "Parts of machines": "snap_fit dropped_casing seal wheel press_fit roller pressed_ball linked_rings",
     "Impacts": "ring two_bodies three_bodies self_contact bouncing_bar bar_on_wall rigid_bar "
                "bouncing_ball ball_in_bowl thrown_ring caught_ring hertz_ball",
     "Friction": "sliding_block dominoes",

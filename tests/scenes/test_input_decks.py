@@ -21,6 +21,7 @@ SHORT = {
     "hertz_ball": {"t_end": 0.05},
     "caught_ring": {"t_end": 0.1},
     "dominoes": {"t_end": 0.4},
+    "dropped_casing": {"t_end": 3e-4},
     "linked_rings": {"h": 0.02, "t_end": 0.3},
     "snap_fit": {"h": 0.05, "t_end": 1.5},
     "ironing": {"h_press": 0.25, "h": 0.1, "path": 0.5},
@@ -170,6 +171,20 @@ def test_snap_fit(tmp_path):
     fields = run.fields()
     nose = np.isclose(fields.x[:, 0], 0.85) & (fields.x[:, 2] < 0)
     assert (fields.x + fields["displacement"][-1])[nose, 0].min() > 1.17
+
+
+def test_dropped_casing(tmp_path):
+    """What the floor does to the momentum lies in Coulomb's cone, and friction takes all that the energy loses."""
+    deck = DECKS/"dropped_casing.inp"
+    (mu,) = figures(deck, r"at most (\S+) of what it does across")
+    history = run_deck(deck, tmp_path, t_end=6e-4).history
+    along, across = np.hypot(np.diff(history["px"]), np.diff(history["py"])), np.diff(history["pz"])
+    scale = np.ptp(history["pz"])
+    assert history["pair2_active"].max() > 0 and along.sum() > 0.1*mu*scale
+    assert (along <= mu*across + 1e-11*scale).all()
+    assert np.diff(history["friction_loss"]).min() >= -1e-13*history["kinetic"].max()
+    total = history["total"] - history["contact_work"] + history["friction_loss"]
+    assert np.ptp(total) < 1e-11*history["kinetic"].max()
 
 
 def test_dominoes(tmp_path):
