@@ -225,9 +225,9 @@ class Cards:
                    dimensions 4, 5 and 6 too: rotations, radians; default all displacements:
                    (1, 2), in three dimensions (1, 2, 3)
         value      one for all, (n_dof,), or (k, n_dof) for k nodes
-        delay      how much later the amplitude begins [T]
+        delay      time by which the amplitude is shifted [T]
         fixed      hold the degrees of freedom where the step finds them
-        op         NEW: all supports of earlier steps go
+        op         NEW: remove all supports of earlier steps
         """
         if dof is None:
             dof = (1, 2) if self._nodes.n_dim == 2 else (1, 2, 3)

@@ -14,13 +14,13 @@ from .handle import Handle
 
 
 class Conditions:
-    """What a stepper offers to change loads and boundary values of the present step of the deck.
+    """Methods of a stepper that change loads and boundary values of the present step of the deck.
 
-    With an amplitude a value is what the amplitude is multiplied by. Without one, the linear runs
-    of a static step go on from where they are to the new value at the end of the step; in a
-    dynamic step it holds from the next step on. Nodes and elements go by their numbers in the
-    deck; in a model of arrays without labels that is row + 1. Raises `InputError`; nothing has
-    changed then.
+    With an amplitude, a value is the factor of the amplitude. Without one, loads of a static step
+    change linearly from their present value to the new value at the end of the step; in a dynamic
+    step the value acts from the next increment on. Nodes and elements are named by their numbers in
+    the deck; in a model of arrays without labels these are row + 1. Methods raise `InputError`, and
+    then nothing has changed.
     """
 
     _handle: Handle
@@ -31,14 +31,14 @@ class Conditions:
     def set_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
         """Give the force on degree of freedom `dof` (1 to n_dim) of `node` a new value [M L/T^2].
 
-        The arguments are numbers or lists, and the deck has such a load in the present step.
+        The arguments are numbers or lists, and the present step of the deck must have such a load.
         """
         self._set_loads(_core.EMCON_LOAD_POINT, node, dof, value)
 
     def set_pressure(self, element: ArrayLike, face: ArrayLike, value: ArrayLike) -> None:
         """Give the pressure on `face` (1 to 4, in space to 6) of `element`, > 0 inwards, a new value [M/(L T^2)].
 
-        The arguments are numbers or lists, and the deck has such a load in the present step.
+        The arguments are numbers or lists, and the present step of the deck must have such a load.
         """
         self._set_loads(_core.EMCON_LOAD_PRESSURE, element, face, value)
 
@@ -52,15 +52,15 @@ class Conditions:
     def set_gravity(self, element: ArrayLike, value: ArrayLike) -> None:
         """Give the gravity on `element` a new value [L/T^2]; its direction stays.
 
-        The arguments are numbers or lists, and the deck has such a load in the present step.
+        The arguments are numbers or lists, and the present step of the deck must have such a load.
         """
         self._set_loads(_core.EMCON_LOAD_GRAVITY, element, 0, value)
 
     def add_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
         """Let a force [M L/T^2] act on degree of freedom `dof` (1 to n_dim) of `node` from now on.
 
-        The arguments are numbers or lists. The present step of the deck has no such load so far;
-        in a static step it runs from 0 to `value` at the end of the step.
+        The arguments are numbers or lists. The present step of the deck must not have such a load
+        yet. In a static step it grows linearly from 0 to `value` at the end of the step.
         """
         self._add_loads(_core.EMCON_LOAD_POINT, node, dof, value)
 
@@ -105,13 +105,13 @@ class Conditions:
     def prescribe(self, node: int, dof: int, value: float) -> None:
         """Prescribe displacement `dof` (1 to n_dim) of `node` [L], whether it was free before or not.
 
-        What was free gets no equation any more: `n_unknown` and `unknowns` change.
+        A free one has no equation any more: `n_unknown` and `unknowns` change.
         """
         value = number(value, "the value")
         self._handle.change(_core.emcon_prescribe, *_freedom(node, dof), value)
 
     def release(self, node: int, dof: int) -> None:
-        """Set displacement `dof` (1 to n_dim) of `node` free, which was prescribed."""
+        """Release the prescribed displacement `dof` (1 to n_dim) of `node`."""
         self._handle.change(_core.emcon_remove_prescribed, *_freedom(node, dof))
 
 

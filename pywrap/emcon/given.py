@@ -40,9 +40,9 @@ _FORCE = ctypes.CFUNCTYPE(_INT, _POINTER, _INT, _POINTER, _POINTER, _INT, _POINT
 
 
 class Outside(Exception):
-    """To be raised by what is given: there is no energy here, as in an inverted element.
+    """Raise this in a law or potential for a state without energy, as of an inverted element.
 
-    The step is tried again in smaller parts, as long as the deck allows it.
+    The step is then repeated in smaller parts, as far as the deck allows.
     """
 
 
@@ -55,11 +55,10 @@ class Solid(Protocol):
 
         Returns forces (n, d) [M L/T^2], the energy at the end, and the derivative of the forces by
         u0 + du, (d n, d n), freedom a of node i being d i + a: a sparse matrix of scipy, a `Csr`,
-        or an array; None will do if `wants_tangent` is false. Nodes that meet in it at rest are
-        those that may meet later; an attribute `pattern`, a matrix with all entries that may come,
-        goes before. Energy is kept if force . du =
-        E(u0 + du) - E(u0). For du = 0 the forces are the gradient of E, and the tangent is that of
-        a step too: half the second derivative of E.
+        or an array; None is allowed if `wants_tangent` is false. The pattern of the tangent at rest
+        must contain all later entries, unless the solid has an attribute `pattern`, a matrix with
+        all of them. Energy is conserved if force . du = E(u0 + du) - E(u0). For du = 0 the forces are
+        the gradient of E, and the tangent is half the second derivative of E, as in a step.
         """
         ...
 

@@ -18,8 +18,8 @@ solver are the host's:
 
         du, lam, active = face.solve_step(u0, du, was_active, newton)
 
-`solve_step` calls `begin_step`, `select`, `newton` and `update_active` in turn; a host whose loop
-is another one does so itself. In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
+`solve_step` calls `begin_step`, `select`, `newton` and `update_active` in turn; a host with a loop
+of its own calls these. In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
 `tests/embed/interface_springs.py` is a complete host. Numbers count from 0; freedom a of node i is
 n_dim i + a; the plane has thickness 1. Units are any consistent set, [L] [M] [T]. Wrong arguments
 and calls out of order raise `InputError`; the interface stays usable.
@@ -63,11 +63,11 @@ class Outcome(enum.Enum):
     """How the search for the active set ended."""
 
     DONE = _core.EMCON_STEP_DONE
-    #: The sets repeat: try a smaller step.
+    #: A set came back that had been tried before: try a smaller step.
     CYCLING = _core.EMCON_STEP_CYCLING
-    #: The motion leaves what contact was chosen for: try a smaller step.
+    #: Nodes moved out of the faces that the search had found: try a smaller step.
     TOO_FAR = _core.EMCON_STEP_TOO_FAR
-    #: A contact would begin farther away than `gap_tolerance`: try a smaller step.
+    #: A contact would begin at a gap above `gap_tolerance`: try a smaller step.
     STANDS_OFF = _core.EMCON_STEP_STANDS_OFF
 
 
@@ -75,8 +75,8 @@ class Outcome(enum.Enum):
 class Gaps:
     """Gaps of all possible contacts at both ends of a step, (n_contact,) each.
 
-    `start`, `end`: gaps, > 0 open [L], of mortar contact weighted means; meaningless where
-    `is_near` is False: no surface is within reach. `is_over`: not past the end of the surface.
+    `start`, `end`: gaps, > 0 open [L], weighted means for mortar contact; undefined where `is_near`
+    is False, because no surface is within reach. `is_over`: not past the end of the surface.
     `edge`: length of an edge, to which tolerances relate [L].
     """
 
@@ -89,16 +89,16 @@ class Gaps:
 
 @dataclass(frozen=True)
 class Constraints:
-    """The n selected contacts over a step; contact k holds its gap at `target[k]`.
+    """The n selected rows of contacts over a step; row k keeps a gap at `target[k]`.
 
-    f is the difference of gap and target times the part of the surface that is covered: `start`
-    and `end` are f at the ends of the step, `change` is g du to relative accuracy, `defect` is what
-    has to become 0. The force on the nodes is `lam @ g`, the linearised defect `c @ d(du)`. In
-    statics the start is the end.
+    f is the difference of gap and target times the share of the surface that is covered: `start`
+    and `end` are f at both ends of the step, `change` is g du, `defect` is what has to become 0.
+    The force on the nodes is `lam @ g`, the linearised defect `c @ d(du)`. In statics `start` is
+    `end`.
 
-    With friction a contact that sticks has rows of its slips, too, behind those of all gaps: there
-    f is the target less the slip, and `lam` the friction. One that slides has none: its friction is
-    in its row of `g`.
+    With friction, contacts that stick have further rows, one for each slip, after those of all
+    gaps: there f is the target minus the slip, and `lam` the friction. For contacts that slide, the
+    row of the gap in `g` contains the friction.
     """
 
     contact: Ints       #: (n,) numbers of contacts, ascending
@@ -123,7 +123,7 @@ class Slips:
     """Status, slip and friction of all possible contacts in the step that was solved last.
 
     `status`: 0 open, 1 acts and does not slide, 2 slides. Slips and friction are vectors along the
-    surface, (n_contact, n_dim - 1); friction times slip is what the step has lost, never below 0.
+    surface; friction times slip is the energy that the step dissipates, >= 0.
     """
 
     status: Ints        #: (n_contact,)
@@ -132,7 +132,7 @@ class Slips:
 
     @property
     def loss(self) -> float:
-        """The energy that friction has taken in the step."""
+        """The energy dissipated by friction in the step [M L^2/T^2]."""
         return float((self.friction*self.slip).sum())
 
 
@@ -140,8 +140,8 @@ class Slips:
 class NullSpace:
     """P and DF, (n_dim n_node, n_unknown - n): P^T g^T = 0, c DF = 0, with ties and held freedoms.
 
-    If `redundant` is not empty, these places of the selection follow from others, and there are no
-    matrices: `Interface.drop` them.
+    If `redundant` is not empty, these rows of the selection depend on others, and there are no
+    matrices: leave them out by `Interface.drop`.
     """
 
     p: Csr | None
@@ -178,10 +178,9 @@ def _exclusive(is_prepared: bool | None = True
 class Interface:
     """Surfaces of a host with their contacts and ties; the module's text shows the order of calls.
 
-    `nodes`: reference positions, (n_node, 2), in space (n_node, 3) [L]; the host's nodes that no
-    surface holds may be left out. Arrays that come back are copies. Any number of interfaces live
-    side by side; each may be used from any thread, but not from two at once: that raises
-    `InputError`.
+    `nodes`: reference positions, (n_node, 2), in space (n_node, 3) [L]; nodes that are on no
+    surface may be left out. Returned arrays are copies. Any number of interfaces may exist at once,
+    each used by one thread at a time: a call from a second thread raises `InputError`.
     """
 
     def __init__(self, nodes: ArrayLike) -> None:
@@ -214,7 +213,7 @@ class Interface:
     # ---- life ------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Free the interface. Harmless when closed; any other call then raises `InputError`."""
+        """Free the interface. Closing twice is harmless; any other call then raises `InputError`."""
         if self._is_busy:
             raise InputError("the interface is in use by another thread: it cannot be closed")
         handle, self._handle = self._handle, 0
@@ -263,10 +262,10 @@ class Interface:
     def add_faces(self, name: str, *faces: ArrayLike) -> int:
         """Add a surface of faces and return its number.
 
-        `faces`: nodes of faces, (k, m) integers, one such array for each kind that the surface has:
-        m is 3, 4, or with a node in the middle of each side 6, 8; in the plane 2, edges. Corners
-        come first, counter-clockwise as seen from outside the body, then the nodes between a corner
-        and the next: `outer_faces` finds them for cells. Raises `InputError` as `add_surface`.
+        `faces`: nodes of faces, (k, m) integers, one array for each kind of face: m is 3 or 4, with
+        mid-side nodes 6 or 8; in the plane 2, edges. Corners come first, counter-clockwise as seen
+        from outside the body, then mid-side nodes, beginning with that between the first two
+        corners: `outer_faces` finds them for cells. Raises `InputError` as `add_surface`.
         """
         if not isinstance(name, str) or "\0" in name:
             raise InputError(f"name is {name!r}, not a text")
@@ -299,15 +298,16 @@ class Interface:
 
         `formulation`: "node to segment", "segment", "mortar". `integration` of mortar contact:
         "segments" (exact) or "elements", with `n_point` Gauss points (1..10, 2..10 on segments).
-        `multiplier`: "standard" or "dual". `normal` of slave nodes: "edge" or "nodal".
-        `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
-        180 degrees, are corners. Rigid obstacles are masters of held nodes. In space contact is
-        "node to segment", of the nodes of the slave (a pair the other way round holds the others),
-        or "mortar". `friction`: the coefficient of Coulomb's law. `adjust` [L]: `prepare` moves
-        slave nodes no farther from the master than this, and those behind it, onto it; take over
-        `positions`. `damping`: the pressure by the velocity of approach [M/(L^2 T)], or this,
-        the clearance from which on there is none [L] and the part of that, 0 to 1, up to which it
-        does not fall; `tangent_fraction`: the part of it against slip.
+        `multiplier`: "standard" or "dual". `normal` of slave nodes: "edge" or "nodal". `smoothing`
+        of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to 180 degrees,
+        are corners. A rigid obstacle is a master whose nodes are held. In space the formulation is
+        "mortar" or "node to segment", which stops the nodes of the slave; a second pair with slave
+        and master exchanged stops the others. `friction`: coefficient of Coulomb's law. `adjust`
+        [L]: `prepare` moves slave nodes that are behind the master, or no farther from it than
+        this, onto it, and returns the new positions. `damping`: pressure over velocity of approach
+        [M/(L^2 T)]; or this, the gap beyond which there is no damping [L], and the part of that
+        gap, 0 to 1, with the full damping. `tangent_fraction`: damping against slip over that
+        against approach.
         """
         choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
@@ -326,9 +326,9 @@ class Interface:
     @_exclusive(False)
     def add_tie(self, slave: int, master: int, *, multiplier: str = "dual",
                 tolerance: float | None = None) -> int:
-        """Tie two surfaces that meet, whatever their meshes; return the tie's number.
+        """Tie two surfaces, whose meshes may differ; return the tie's number.
 
-        `tolerance`: how far apart they may be [L]; None: a tenth of an edge.
+        `tolerance`: largest distance between them [L]; None: a tenth of an edge.
         """
         reach = -1.0 if tolerance is None else number(tolerance, "tolerance")
         if tolerance is not None and reach < 0:
@@ -350,10 +350,11 @@ class Interface:
                   is_last_try: bool = False, is_end: bool = False) -> None:
         """Set options, also between steps; options that are not named get their defaults again.
 
-        `initiation`: "persistent" contact holds the gap that its first step began with, which keeps
-        energy, "admissible" closes it. `gap_tolerance`: no contact begins with a larger gap per
-        edge, 0 for any. `is_last_try`: the host cannot try the step in smaller parts. `is_end`:
-        statics, gradients at the end of the step and closed gaps; set it before `prepare`, too.
+        `initiation`: "persistent" contact keeps the gap that it had at the start of its first step,
+        which conserves energy; "admissible" closes it, which dissipates energy. `gap_tolerance`:
+        largest gap at which a contact may begin, in edge lengths; 0: any. `is_last_try`: the host
+        cannot repeat the step in smaller parts. `is_end`: statics, with gradients at the end of the
+        step and closed gaps; set it before `prepare`, too.
         """
         kind = _choice("initiation", initiation)
         settings = made("emcon_contact_settings", kind, number(gap_tolerance, "gap_tolerance"),
@@ -364,9 +365,9 @@ class Interface:
     def prepare(self, held: ArrayLike | None = None) -> Floats:
         """End the definition; after this, steps can begin. Returns positions, (n_node, n_dim) [L].
 
-        `held`: freedoms that the host moves by itself, (n_node, n_dim) booleans; None: none. Slave
-        nodes of ties are moved onto their masters: the host takes over the positions. After an
-        error in what was given before, begin with a new interface.
+        `held`: degrees of freedom that the host prescribes, (n_node, n_dim) booleans; None: none.
+        Slave nodes of ties are moved onto their masters: use the positions that are returned. After
+        an error in a surface, pair or tie begin with a new interface.
         """
         if held is None:
             held = np.zeros((self.n_node, self.n_dim), bool)
@@ -388,7 +389,7 @@ class Interface:
 
     @property
     def largest_move(self) -> float:
-        """How far `prepare` has moved a slave node onto its master at most [L]."""
+        """Largest distance by which `prepare` has moved a slave node onto its master [L]."""
         return float(np.linalg.norm(self.positions - self._x, axis=1).max())
 
     @property
@@ -470,11 +471,11 @@ class Interface:
         """Begin a step; `du` is the motion that you expect.
 
         `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
-        Returns those that still can. `stop`, where pairs have friction: the motion with which all
-        velocities end at zero, (n_node, n_dim), h/2 v0 where the velocity at the end is
-        2 du/h - v0: what sticks comes to rest. None: what sticks has its velocity along the surface
-        turned round, which takes no energy. `h`, where pairs have damping: the size of the step
-        [T].
+        Returns those of them that still have a surface near. `stop`, if pairs have friction: the
+        motion with which all velocities end at 0, (n_node, n_dim) [L]: h/2 v0 if the velocity at
+        the end is 2 du/h - v0. Nodes that stick then end with velocity 0 along the surface; with
+        None that velocity is reversed, which dissipates nothing. `h` [T], if pairs have damping:
+        the size of the step.
         """
         was = self._flags("was_active", was_active)
         to_rest = None if stop is None else self._field("stop", stop)
@@ -491,10 +492,10 @@ class Interface:
                    ) -> tuple[Floats, Floats, Flags]:
         """Solve a step with one set of contacts after the other: du, multipliers, active flags.
 
-        `newton(du, n)` solves with the n rows that are selected, from the motion du on; it returns
-        the motion and the multipliers, and sums of sizes of the residual for `update_active` if it
-        has them. `together`: with all candidates (`select_candidates`). The rest is as in
-        `begin_step`. Raises `AnalysisError` where no set ends the step: try a smaller one.
+        `newton(du, n)` solves with the n selected rows, starting from the motion du; it returns the
+        motion and the multipliers, optionally the `magnitude` of `update_active`. `together`: solve
+        with all candidates (`select_candidates`). Other arguments are those of `begin_step`. Raises
+        `AnalysisError` if no set completes the step: try a smaller step.
         """
         motion = np.array(self._field("du", du))
         active, outcome = self.begin_step(u0, motion, was_active, stop, h), None
@@ -511,17 +512,18 @@ class Interface:
                solve: Solve | None = None) -> Callable[[Floats, int], tuple[Floats, ...]]:
         """Newton's method for `solve_step`, of a residual and a tangent.
 
-        `respond(du)` gives the residual of the step without contact, a field, and its derivative by
-        du, an array or a sparse matrix of scipy; after `set_map` both are by the unknowns w. It may
-        give a third result, the `magnitude` of `update_active`. `free`: the numbers of the freedoms
-        that are solved for; None: all that are neither held nor tied. `solve(matrix, right)`: your
-        linear solver, matrix^-1 times the columns of `right`; None: LAPACK or SuperLU.
+        `respond(du)` returns the residual of the step without contact, (n_node, n_dim), and its
+        derivative with respect to du, an array or a sparse matrix of scipy; after `set_map` both
+        are by the unknowns w. It may return a third result, the `magnitude` of `update_active`.
+        `free`: numbers of the freedoms that are solved for; None: all that are neither held nor
+        tied. `solve(matrix, right)`: your linear solver, matrix^-1 times the columns of `right`;
+        None: LAPACK or SuperLU.
 
-        What damping pushes is added. In each iterate the equations are condensed to the rows of
-        contact with `together=True`, otherwise to the null space of the selected contacts, which
-        takes neither `free` nor a map. It ends where the motion is round-off of the positions, or
-        does not decrease any more. Raises `AnalysisError` where it does not converge, and where
-        selected contacts follow from others.
+        Forces of damping are added. With `together=True` the equations are condensed to the rows of
+        contact in each iterate, otherwise to the null space of the selected contacts, for which
+        `free` and `set_map` cannot be used. It ends when the correction is round-off of the
+        positions, or does not decrease any more. Raises `AnalysisError` if it does not converge, or
+        if selected contacts depend on others.
         """
         return HostNewton(self, np.array(self._field("u0", u0)), respond, free, solve).solve
 
@@ -542,11 +544,11 @@ class Interface:
 
     @_exclusive()
     def select_candidates(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
-        """In place of `select`: contacts of which any may act, stick or slide; how many rows.
+        """In place of `select`: contacts each of which may be open, stick or slide; how many rows.
 
-        All candidates have rows of their gaps and slips, and `solve_contacts` gives multipliers in
-        each iterate of Newton's method. `update_active` adds candidates until none is missing, and
-        lets go those that do not push once the step is solved.
+        All candidates have rows of their gaps and slips, and `solve_contacts` returns multipliers
+        in each iterate of Newton's method. `update_active` adds candidates until none is missing,
+        and releases those without force once the step is solved.
         """
         flags = self._flags("active", active)
         self._has_candidates = True
@@ -554,10 +556,10 @@ class Interface:
 
     @_exclusive()
     def solve_contacts(self, w: ArrayLike, free: ArrayLike) -> Floats:
-        """The multipliers that obey the laws of all candidates, (n,).
+        """The multipliers that satisfy the laws of contact and friction of all candidates, (n,).
 
-        `w`: c K^-1 g^T, (n, n), with the host's tangent K; `free`: the defect less c K^-1 times the
-        residual without contact forces, (n,). Newton's step is then K^-1 (g^T lam - residual).
+        `w`: c K^-1 g^T, (n, n), with the host's tangent K; `free`: the defect minus c K^-1 times
+        the residual without contact forces, (n,). Newton's step is then K^-1 (g^T lam - residual).
         Raises `AnalysisError` where none are found.
         """
         n = self._n_selected()
@@ -611,11 +613,11 @@ class Interface:
     @_exclusive()
     def update_active(self, u0: ArrayLike, du: ArrayLike, lam: ArrayLike, active: ArrayLike,
                       magnitude: ArrayLike | None = None) -> tuple[Flags, Outcome | None]:
-        """The next active set from a solved step: with what would penetrate, without what pulls.
+        """The next active set from a solved step: penetrating contacts are added, pulling ones released.
 
-        `active`: what was selected; `lam`: its multipliers. `magnitude`, (n_node, n_dim): sums of
-        the sizes of the contributions to the residual, which tell signs of round-off from tension;
-        None: the contact forces. Returns the next set and None, or the last one and its `Outcome`.
+        `active`: the selected contacts; `lam`: their multipliers. `magnitude`, (n_node, n_dim):
+        sums of |contributions| to the residual, to tell round-off from tension; None: the contact
+        forces are used. Returns the next set and None, or the last set and the `Outcome`.
         """
         u, d = self._motion(u0, du)
         flags = self._flags("active", active)
@@ -633,9 +635,9 @@ class Interface:
 
     @_exclusive()
     def law_forces(self) -> tuple[Floats, float]:
-        """Damping forces at the nodes in the last evaluated step, and the energy that they take.
+        """Damping forces at the nodes in the last evaluated step, and the energy they dissipate.
 
-        Forces, (n_node, n_dim), to be added to those of contact; their derivative is in
+        Add the forces, (n_node, n_dim) [M L/T^2], to those of contact; their derivative is in
         `curvature`. The energy is >= 0.
         """
         force, taken = self._call(_core.emcon_law_forces, self.n_node)
@@ -643,10 +645,11 @@ class Interface:
 
     @_exclusive()
     def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
-        """Areas that the multipliers of the step to `u1` act on, (n_contact,) [L^2], and lengths.
+        """Areas on which the multipliers of the step to `u1` act, (n_contact,) [L^2], and lengths.
 
         The pressure of a contact is its multiplier over its area. The lengths, (n_contact,) [L],
-        are those of slave surface that belong to the contacts at the end, in space roots of areas.
+        are those of the slave surface that belong to the contacts at the end, in space roots of
+        areas.
         """
         area, length = self._call(_core.emcon_get_areas, self._field("u1", u1),
                                   self.n_contact + self._n_row)
@@ -654,11 +657,11 @@ class Interface:
 
     @_exclusive()
     def overlap(self, u0: ArrayLike, du: ArrayLike) -> tuple[float, int | None]:
-        """The deepest overlap of bodies in the step, per edge, and the node that is behind.
+        """The deepest overlap of bodies in the step, in edge lengths, and the node that is inside.
 
-        It is found by geometry alone, whatever contact says: 0 and None if there is none. Surfaces
-        of pairs are their outlines: of two of which neither closes around its body, nothing is
-        found.
+        It is computed from positions alone: 0 and None if there is no overlap. Bodies are bounded
+        by the surfaces of the pairs: if neither of two surfaces closes around its body, no overlap
+        is found.
         """
         depth, node = self._call(_core.emcon_overlap, *self._motion(u0, du))
         return depth, node if node >= 0 else None
@@ -682,7 +685,7 @@ class Interface:
     def drop(self, redundant: ArrayLike) -> Flags:
         """Leave selected contacts out for the rest of the step; return what is left, (n_contact,).
 
-        `redundant`: their places in the selection, as `null_space` tells.
+        `redundant`: their places in the selection, as `null_space` returns them.
         """
         place = _whole("redundant", redundant, 1, self._n_selected())
         return self._contacts_of(self._call(_core.emcon_drop, place, self.n_contact + self._n_row))
@@ -695,9 +698,9 @@ class Interface:
 
     @_exclusive()
     def particular(self, defect: ArrayLike) -> Floats:
-        """The motion of dependent unknowns alone that closes `defect`, (n,); (n_node, n_dim) [L].
+        """The motion of the dependent unknowns that makes `defect`, (n,), 0; (n_node, n_dim) [L].
 
-        After `null_space`. Newton's step is this plus DF times that of the others.
+        After `null_space`. Newton's step is this plus DF times that of the independent ones.
         """
         return self._call(_core.emcon_particular, self._of_selected("defect", defect), self.n_node)
 

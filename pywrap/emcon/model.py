@@ -1,4 +1,4 @@
-"""The model: what is to be analysed, as a deck says it. A `Stepper` analyses it.
+"""The model: what is to be analysed, as in a deck. A `Stepper` analyses it.
 
     nodes = [[0, 0], [1, 0], [1, 1], [0, 1]]
     model = Model.from_arrays(nodes, [[0, 1, 2, 3]], heading="A square, pulled at a corner")
@@ -46,9 +46,9 @@ KINDS = {word: int(re.sub("C(PE|PS|AX|3D)|[A-Z]", "", word)) for word in words("
 class Model(Source):
     """A scene: mesh, sets, materials, contact, steps; made of a deck, a mesh, arrays or calls.
 
-    Each method adds one card of docs/deck.md, which says what it means. Where an argument is a
-    number, `"<name>"` stands for a parameter of the deck. Errors of the reader name the line of
-    Python that made the card: ``study.py:42: error: ...``.
+    Each method adds one card, which docs/deck.md explains. In place of a number, `"<name>"` stands
+    for a parameter of the deck. Errors name the line of Python that made the card:
+    ``study.py:42: error: ...``.
 
     Nodes and elements are counted from 0 in the order in which `add_nodes` and `add_elements` (or
     `from_arrays`) give them; row i has the label i + 1, in messages and results, unless labels are
@@ -392,18 +392,18 @@ class Model(Source):
         """`*SURFACE INTERACTION`, hard if no pressure is given.
 
         friction        coefficient of Coulomb's law, 0 or more; "ROUGH": nothing slides; default 0
-        friction_restitution   0 to 1: the part of the velocity along the surface of what sticks
-                        that goes back; default 0
-        pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; a node with a pad
-                        as thick as a radius is a circle
-        restitution     0 to 1: the part of the velocity at which nodes with mass meet that is
-                        left afterwards; default 1
-        damping         pressure by relative velocity [M/(L^2 T)]; or this, the clearance from
-                        which on there is none [L] and the part of that, 0 to 1, up to which it
-                        does not fall; default none
-        tangent_fraction   the part of it, 0 or more, against slip; default 0
-        pressure        by the overclosure: ("LINEAR", slope [M/(L^2 T^2)]) with a tension
-                        [M/(L T^2)] behind it or without; ("EXPONENTIAL", clearance [L], pressure
+        friction_restitution   0 to 1: the fraction of the velocity along the surface that contacts
+                        which stick reverse; default 0
+        pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; contact treats a
+                        node with a pad as a circle, in space as a ball
+        restitution     0 to 1: the fraction of the speed of approach with which nodes with mass
+                        separate; default 1
+        damping         pressure over relative velocity [M/(L^2 T)]; or this, the gap beyond which
+                        there is no damping [L], and the part of that gap, 0 to 1, with the full
+                        damping; default none
+        tangent_fraction   damping against slip over that against approach, 0 or more; default 0
+        pressure        over the overclosure: ("LINEAR", slope [M/(L^2 T^2)]), optionally with a
+                        tension [M/(L T^2)] at its end; ("EXPONENTIAL", clearance [L], pressure
                         at zero gap); ("TABULAR", (pressure, overclosure), ...) from pressure 0 on
         """
         if damping is None and tangent_fraction is not None:
@@ -434,12 +434,12 @@ class Model(Source):
 
         interaction   default one of its own, frictionless
         type          NODE TO SURFACE, SEGMENT or MORTAR
-        sides         ONE: nodes of the slave are held; BOTH: of the master too, NODE TO SURFACE
-                      only; AUTO (default): both there, else those of the rounder surface where
-                      the slave would push it sideways, of the slave with `adjust`
-        guard         YES (default): nodes that the pair does not hold go in by a twentieth of an
-                      edge at most; NO: they may go in
-        edges         YES (default): sharp edges that cross are held, in three dimensions; NO: not
+        sides         ONE: contact stops nodes of the slave; BOTH: of the master, too, NODE TO SURFACE
+                      only; AUTO (default): both for NODE TO SURFACE; else the rounder surface
+                      becomes the slave if the other would push it sideways, without `adjust`
+        guard         YES (default): other nodes enter by a twentieth of an edge at most; NO: they
+                      may enter
+        edges         YES (default): sharp edges that cross are stopped, in three dimensions; NO: not
         adjust        distance [L] up to which slave nodes are moved onto the master, or a node set
         initiation    MASSLESS: its slave nodes carry no mass; PERSISTENT: they do; default: as
                       `contact_initiation` says
@@ -475,12 +475,13 @@ class Model(Source):
             cyclic_symmetry: bool = False, adjust: bool = True) -> Model:
         """`*TIE` of two surfaces, of a cell that repeats itself or of a sector.
 
-        position_tolerance   how far apart they may be [L]; default a tenth of an edge
+        position_tolerance   largest distance between them [L]; default a tenth of an edge
         multiplier           DUAL (default) or STANDARD
         translation          (2,) or (3,) from the slave to where it lies on the master [L]
         reference            node whose displacement adds to the translation
         cyclic_symmetry      the slave turned by a sector lies on the master: see `sectors`
-        adjust               False: slave nodes stay where they are, across gaps angular momentum is lost
+        adjust               False: slave nodes are not moved; across gaps angular momentum is not
+                             conserved
         """
         return self._card("TIE", {"NAME": name, "POSITION TOLERANCE": position_tolerance,
                                   "MULTIPLIER": multiplier, "ADJUST": "YES" if adjust else "NO",
@@ -551,11 +552,11 @@ class Model(Source):
     def potential(self, function: PointFunction, nodes: Where | None = None) -> Model:
         """A potential of the present position of each of some nodes: V [M L^2/T^2].
 
-        function   of positions (n, d) [L], d dimensions; returns V (n,) and its first and second
+        function   of positions (n, d) [L], d dimensions; it returns V (n,) and its first and second
                    derivatives, (n, d) and (n, d, d)
         nodes      node set, or (k,) nodes; default all
 
-        Energies count it as `potential`; the discrete gradient made of it keeps the total.
+        Energies contain it as `potential`; its discrete gradient conserves the total.
         """
         check_function(f"potential {len(self._potentials) + 1}", function)
         where = None
@@ -577,11 +578,12 @@ class Model(Source):
         h_min, h_max   bounds of the increment [T] where it is cut or grown
         direct         keep to h
         explicit       of dynamic steps: central differences, h below the critical step
-        stabilize      of static steps: viscous forces hold what snaps; a number: the part of the
-                       strain energy that they take from the first increment (2e-4)
+        stabilize      of static steps: viscous forces, so that snapping bodies find an equilibrium;
+                       a number: the fraction of the strain energy that they dissipate in the
+                       first increment (2e-4)
         nlgeom         large displacements; stays on for later steps
-        increments     most increments of the step; default no limit
-        amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
+        increments     largest number of increments of the step; default no limit
+        amplitude      RAMP (default of static steps) or STEP (default of dynamic ones)
         solver         DEFAULT, DIRECT, ITERATIVE, UMFPACK or MUMPS
         """
         options: dict[str, object] = {

@@ -21,10 +21,10 @@ _NO_FLAGS = np.empty(0, dtype=np.int32)
 
 
 class Evaluation:
-    """A step of size h from the state of a stepper to displacements u1, evaluated, not made.
+    """What a step of size h from the state of a stepper to displacements u1 computes.
 
-    It is valid until the model changes or the next evaluation, also by one of the short forms of
-    the stepper, or report of constraints is made; after that it raises `InputError`.
+    The step is not made. The object is valid until the model changes, or until the next evaluation
+    or report of constraints, also by the short forms of the stepper; then it raises `InputError`.
     """
 
     def __init__(self, stepper: Queries, with_tangent: bool, *arguments: Any) -> None:
@@ -42,9 +42,9 @@ class Evaluation:
         return self._handle.call(function, *arguments)
 
     def residual(self, *, contact: bool = True) -> NDArray[np.float64]:
-        """Inertia and internal forces less loads, (n_node, n_dim) [M L/T^2].
+        """Inertia plus internal forces minus loads, (n_node, n_dim) [M L/T^2].
 
-        With `contact` also less contact forces. At prescribed freedoms it is the reaction.
+        With `contact` minus contact forces, too. At prescribed freedoms it is the reaction.
         """
         return self._call(lambda a: _core.emcon_residual(
             a, int(contact), self._n_node, 0, no_unknown=1)[:2])
@@ -55,10 +55,10 @@ class Evaluation:
             a, int(contact), 0, self._n_unknown, no_nodal=1)[::2])
 
     def tangent(self, *, contact: bool = True) -> Csr:
-        """Derivative of the residual on the unknowns by them at the end, for given multipliers.
+        """Derivative of the residual with respect to the unknowns at the end, for given multipliers.
 
-        (n_unknown, n_unknown) [M/T^2]. With `contact` the second derivatives of the gaps are in
-        it, times the multipliers. Needs an evaluation ``with_tangent``.
+        (n_unknown, n_unknown) [M/T^2]. With `contact` it contains the second derivatives of the gaps
+        times the multipliers. Needs an evaluation ``with_tangent``.
         """
         return self._call(_matrices, _core.emcon_tangent, int(contact))
 
@@ -66,16 +66,16 @@ class Evaluation:
         """P and DF, each (n_dim n_node, independent unknowns), for the constraints that act.
 
         P^T G^T = 0 and C DF = 0 for their discrete gradients G and their gradients C at the end.
-        Ties, equations and prescribed freedoms are taken account of. Raises `AnalysisError` if
-        there is none: constraints that follow from others.
+        Ties, equations and prescribed freedoms are eliminated. Raises `AnalysisError` if some
+        constraints depend on others.
         """
         return self._call(_null_space)
 
     def multipliers(self) -> NDArray[np.float64]:
-        """The contact forces that the residual without them amounts to, (n_constraint,) [M L/T^2].
+        """Contact forces that balance the residual without them, (n_constraint,) [M L/T^2].
 
-        They balance it on the unknowns that `null_space` makes dependent; 0 where a constraint
-        does not act.
+        They balance it in the dependent unknowns of `null_space`; 0 for constraints that do not
+        act.
         """
         if not self._has_null_space:
             self._call(_null_space)
@@ -85,7 +85,7 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class ConstraintReport:
-    """Contact constraints between two configurations, near each other's surfaces; n of them.
+    """The n contact constraints between two configurations that have a surface near.
 
     Gaps are > 0 where open, and ``dgap = discrete_gradient @ (u1 - u0).ravel()`` to round-off.
     """
@@ -107,8 +107,8 @@ class ConstraintReport:
     def curvature_times(self, factor: ArrayLike, direction: ArrayLike) -> NDArray[np.float64]:
         """Sum over the constraints of factor times (dG/du1) times direction, (n_node, n_dim).
 
-        `factor` (n,) for instance multipliers, `direction` (n_node, n_dim). Belongs to the last
-        report or evaluation of a stepper; raises `InputError` for earlier ones.
+        `factor` (n,), for instance multipliers; `direction` (n_node, n_dim). Only for the last report
+        or evaluation of a stepper; earlier ones raise `InputError`.
         """
         factor = real_array(factor, "the factor", self.id.shape)
         direction = real_array(direction, "the direction", (self._n_node, self._n_dim))
@@ -119,7 +119,7 @@ class ConstraintReport:
 
 
 class Queries:
-    """What a stepper can be asked. It changes neither the state nor, in any bit, what follows."""
+    """Queries of a stepper. They change neither the state nor any bit of later steps."""
 
     _handle: Handle
     n_node: int
@@ -136,7 +136,7 @@ class Queries:
         raise NotImplementedError
 
     def guess(self, h: float) -> NDArray[np.float64]:
-        """Displacements from which a step of size h would start to iterate, (n_node, n_dim) [L]."""
+        """Displacements with which the iteration of a step of size h begins, (n_node, n_dim) [L]."""
         return self._handle.call(_core.emcon_guess, positive(h, "h"), self.n_node)
 
     def evaluate(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
@@ -154,18 +154,18 @@ class Queries:
 
     def residual(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                  active: ArrayLike | None = None, contact: bool = True) -> NDArray[np.float64]:
-        """Residual at the nodes, (n_node, n_dim): of `evaluate`, where the arguments are told."""
+        """Residual at the nodes, (n_node, n_dim): see `evaluate` for the arguments."""
         evaluation = self.evaluate(u1, h, lam=lam, active=active, with_tangent=False)
         return evaluation.residual(contact=contact)
 
     def tangent(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                 active: ArrayLike | None = None, contact: bool = True) -> Csr:
-        """Tangent on the unknowns: of `evaluate`, where the arguments are told."""
+        """Tangent on the unknowns: see `evaluate` for the arguments."""
         return self.evaluate(u1, h, lam=lam, active=active).tangent(contact=contact)
 
     def null_space(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                    active: ArrayLike | None = None) -> tuple[Csr, Csr]:
-        """P and DF: of `evaluate`, where the arguments are told."""
+        """P and DF: see `evaluate` for the arguments."""
         evaluation = self.evaluate(u1, h, lam=lam, active=active, with_tangent=False)
         return evaluation.null_space()
 
@@ -185,7 +185,9 @@ class Queries:
 
     @property
     def unknowns(self) -> NDArray[np.int32]:
-        """Unknown of each freedom, (n_node, n_dim), from 0; -1: prescribed, dependent, no element."""
+        """Number of the unknown of each degree of freedom, (n_node, n_dim), from 0.
+
+        -1: prescribed, dependent, or without an element."""
         return self._handle.call(_core.emcon_unknowns, self.n_node)
 
     def constraint(self, q0: ArrayLike | None = None, q1: ArrayLike | None = None, *,
@@ -193,10 +195,10 @@ class Queries:
                    keeps_gap: bool = False) -> ConstraintReport:
         """Contact between positions `q0` and `q1`, or displacements `u0` and `u1`, (n_node, n_dim) [L].
 
-        The library works with displacements. X + u and back costs a rounding of X, about 1e-16 of
-        it, which the gaps then have: give displacements where that counts. With `keeps_gap` the
-        constraints are those that hold the mean gap of the start, as persistent contact does:
-        integrated gaps have other gradients then, and all gaps are counted from there.
+        The library works with displacements. Positions are rounded to about 1e-16 of X, and gaps have
+        that error then: give displacements if it matters. With `keeps_gap` each constraint keeps the
+        gap of the start, as persistent contact does: gaps are counted from there, and integrated gaps
+        have other gradients.
         """
         if (q0 is None) != (q1 is None) or (u0 is None) != (u1 is None) \
                 or (q0 is None) == (u0 is None):

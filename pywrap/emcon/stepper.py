@@ -40,10 +40,10 @@ _MOMENTA = {2: ("px", "py", "lz"), 3: ("px", "py", "pz", "lx", "ly", "lz")}
 
 @dataclass(frozen=True)
 class Increment:
-    """What one increment took: h and time in the deck's units, and counts.
+    """One increment: its size h and the time at its end [T], and counts.
 
-    `penetration` is the deepest that geometry found at its end, per edge: both ways, nodes and
-    edges of all surfaces in contact.
+    `newton`: iterations over all cuts and active sets; `active`: active contacts. `penetration`:
+    deepest overlap of bodies at the end, in edge lengths, from positions alone.
     """
 
     h: float
@@ -56,13 +56,14 @@ class Increment:
 
 @dataclass(frozen=True)
 class PairTotal:
-    """What a contact pair transmits: sums over one side, and what is in contact.
+    """Force, moment and size of a contact pair.
 
-    `slave` and `master` are the force and the moment about the origin on that side, in the plane
-    fx, fy, m, in space fx, fy, fz, mx, my, mz: opposite to each other to round-off. `length` is the
-    length of the slave surface in contact, in space its area. `friction_loss` is the energy that
-    friction has taken since the start; of a pair that holds both sides all of it, and 0 at its
-    reverse.
+    `slave` and `master` are force [M L/T^2] and moment about the origin on that side, in the plane
+    fx, fy, m, in space fx, fy, fz, mx, my, mz; they are opposite to each other up to round-off.
+    `length` is the length of the slave surface in contact [L], in space its area [L^2]; `active` is
+    the number of active contacts. `friction_loss` is the energy dissipated by friction since the
+    start [M L^2/T^2]. A pair that stops nodes of both sides counts as two: the first has all of its
+    loss, the second 0.
     """
 
     slave: NDArray[np.float64]
@@ -73,16 +74,16 @@ class PairTotal:
 
 
 class Friction(NamedTuple):
-    """Contacts that rub, all 0 without `*FRICTION`: CSHEAR and CSLIP of the deck."""
+    """Friction of all contacts, 0 without `*FRICTION`: CSHEAR and CSLIP of the deck."""
 
     shear: NDArray[np.float64]     #: (n_constraint, n_dim - 1) traction against slip [M/(L T^2)]
-    status: NDArray[np.int32]      #: 1 where it sticks, 2 where it slides
-    slip: NDArray[np.float64]      #: (n_constraint, n_dim - 1) along the surface so far [L]
-    path: NDArray[np.float64]      #: the length of that way [L]
+    status: NDArray[np.int32]      #: (n_constraint,) 1: sticks, 2: slides
+    slip: NDArray[np.float64]      #: (n_constraint, n_dim - 1) since the start [L]
+    path: NDArray[np.float64]      #: (n_constraint,) length of the path [L]
 
 
 class Snapshot:
-    """A state to come back to, of `Stepper.save`; `Stepper.restore` does."""
+    """A saved state, made by `Stepper.save` for `Stepper.restore`."""
 
     def __init__(self, address: int) -> None:
         self._address = address
@@ -100,17 +101,15 @@ class Snapshot:
 
 
 class Stepper(Queries, Conditions, Meshes):
-    """A model at some point of its analysis; `model` is a `Model`, or the path of a deck.
+    """A model and the present state of its analysis; `model` is a `Model`, or the path of a deck.
 
     Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
-    copies, of shape (n_node, n_dim) where they belong to nodes; `n_dim` is 2 or, of decks of three
-    dimensions, 3. Any number of steppers live side by
-    side; each may run in a thread of its own, but not in two at once: that raises `InputError`,
-    as do a bad deck, bad arguments, and any call after `close`.
+    copies; arrays of nodes have the shape (n_node, n_dim), `n_dim` 2 or 3. Any number of steppers
+    may exist at once, each used by one thread at a time. A call from a second thread, a bad deck,
+    bad arguments, and any call after `close` raise `InputError`.
 
-    Ctrl-C takes effect between increments. One that is under way is finished first; the stepper
-    is then at its end and can go on. Where functions of yours are called in it, a second Ctrl-C
-    does not wait.
+    Ctrl-C takes effect at the end of the current increment, from which the stepper can continue. If
+    functions of yours are called in an increment, a second Ctrl-C takes effect at once.
     """
 
     def __init__(self, model: str | os.PathLike[str] | Source, *, lenient: bool = False,
@@ -145,10 +144,10 @@ class Stepper(Queries, Conditions, Meshes):
 
     @classmethod
     def from_restart(cls, path: str | os.PathLike[str], model: Source | None = None) -> Stepper:
-        """The stepper that a restart file holds, of `write_restart` or of a run of the program.
+        """A stepper from a restart file, of `write_restart` or of a run of the program.
 
-        It goes on to the same bits. `model` is needed where laws, potentials or a host's solid were
-        given to it: these are not in the file. Raises `OSError` for what is no such file.
+        It continues with the same bits. `model` is needed if the file's model had laws, potentials
+        or a host's solid: these are not in the file. Raises `OSError` if `path` is no restart file.
         """
         name = path_bytes(path)
 
@@ -164,14 +163,14 @@ class Stepper(Queries, Conditions, Meshes):
         return stepper
 
     def write_restart(self, path: str | os.PathLike[str]) -> None:
-        """Write the deck, the state, and what was changed of the conditions of the present step."""
+        """Write deck, state and present conditions to a restart file. Raises `OSError`."""
         name = path_bytes(path)
         if os.path.exists(name) and not os.path.isfile(name):
             raise OSError(f"{os.fsdecode(name)} is no file that could be replaced")
         self._handle.call(_core.emcon_save, name)
 
     def close(self) -> None:
-        """Free the model. Harmless when closed; any other call then raises `InputError`."""
+        """Free the model. Closing twice is harmless; any other call then raises `InputError`."""
         self._handle.close()
 
     def __enter__(self) -> Stepper:
@@ -184,10 +183,9 @@ class Stepper(Queries, Conditions, Meshes):
     # ---- steps ------------------------------------------------------------------------------
 
     def set_threads(self, n: int) -> None:
-        """Let `n` threads work on the model from here on.
+        """Use `n` threads from now on; the default is `OMP_NUM_THREADS`, or 1.
 
-        Before, as many do as `OMP_NUM_THREADS` says, or one if it is not set. Results are the same
-        to the last bit for any number.
+        Results have the same bits for any number.
         """
         count = labels(n, "n")
         if count.size != 1:
@@ -195,11 +193,11 @@ class Stepper(Queries, Conditions, Meshes):
         self._handle.call(_core.emcon_set_threads, int(count[0]))
 
     def step(self, h: float | None = None) -> Increment:
-        """Advance: by one increment of the deck, beginning its next step where one is at its end.
+        """Make one increment of the deck, or one of size `h` [T]; begin the next step if one ends.
 
-        With `h` [T] by that much, under the conditions of the present step of the deck, also
-        beyond its end. Where a step fails it is made in parts. Raises `AnalysisError` if that does
-        not help: with `h` the state is that before the call, else that of the last part.
+        With `h` the conditions are those of the present step of the deck, also beyond its end. An
+        increment that fails is repeated in parts. Raises `AnalysisError` if these fail too: with
+        `h` the state is that before the call, else that of the last part that succeeded.
         """
         if h is None:
             made = self._handle.change(_core.emcon_advance)
@@ -208,20 +206,20 @@ class Stepper(Queries, Conditions, Meshes):
         return Increment(*structure("emcon_increment", made).values())
 
     def next_step(self) -> None:
-        """Begin the next step of the deck at the present time, wherever that is."""
+        """Begin the next step of the deck at the present time."""
         self._handle.change(_core.emcon_next_step)
 
     def run(self, until: float | None = None,
             callback: Callable[[Stepper, Increment], bool | None] | None = None, *,
             output: str | os.PathLike[str] | None = None, progress: bool = False) -> int:
-        """Advance by increments of the deck to its end, or to the first that reaches time `until`.
+        """Make increments of the deck to its end, or to the first that reaches time `until` [T].
 
-        ``callback(stepper, increment)`` is called after each; where it returns True the run stops
-        there, None and False go on. What it raises ends the run as well. With `output` the run
-        leaves files as one of the program does (docs/deck.md), from its first state on, for
-        `Results`: those of a name FOLDER/NAME, or of FOLDER/run where there is such a folder. With
-        `progress` a line on standard error tells how far it is. Returns the number of increments
-        made; the stepper can go on in any case.
+        ``callback(stepper, increment)`` is called after each; if it returns True or raises an
+        exception, the run ends there. `output`: base name of the files that a run of the program
+        writes (docs/deck.md), for `Results`; if it is a folder, the name is `run` in it.
+        `progress`: show the progress on standard error. Returns the number of increments made; the
+        stepper can continue in any case. Raises `AnalysisError` as `step` does, `OSError` if a file
+        cannot be written.
         """
         if until is not None:
             until = number(until, "until")
@@ -275,9 +273,9 @@ class Stepper(Queries, Conditions, Meshes):
                 self._handle.call(_core.emcon_end_record)
 
     def results(self) -> Results:
-        """What the last `run` with `output=` has left, also of a stepper that is closed.
+        """The `Results` of the last `run` with `output=`, also after `close`.
 
-        Fields are read from the files when they are asked for; close it, or use it by `with`.
+        Fields are read from the files when you access them; close the object, or use `with`.
         """
         if self._base is None:
             raise InputError("nothing was recorded: give output= to run")
@@ -287,7 +285,7 @@ class Stepper(Queries, Conditions, Meshes):
 
     @property
     def fraction(self) -> float:
-        """How much of the run of the deck is done, 0 to 1."""
+        """Fraction of the run of the deck that is done, 0 to 1."""
         return float(self._handle.call(_core.emcon_get_progress)[0])
 
     @property
@@ -320,15 +318,15 @@ class Stepper(Queries, Conditions, Meshes):
 
     @property
     def notes(self) -> list[str]:
-        """Warnings of the deck, and what was done before the first step: moved nodes and so on."""
+        """Warnings about the deck, and changes before the first step, such as moved nodes."""
         lines: str = self._handle.call(_text, _core.emcon_get_notes)
         return [line.rstrip() for line in lines.split("\n")] if lines else []
 
     def report(self) -> dict[str, list[dict[str, Any]]]:
-        """What the scene consists of: `emcon check --json` but for the cost.
+        """Description of the scene: `emcon check --json` without the cost.
 
-        Lists of "bodies", "pairs", "ties", "parts" that are on or off, "sizes", "increments",
-        "advice"; "text" of each is its line in the log. A notebook shows them as tables.
+        Lists of "bodies", "pairs", "ties", "parts" of the program in use, "sizes", "increments",
+        "advice"; "text" of each entry is its line in the log. A notebook shows them as tables.
         """
         report: dict[str, list[dict[str, Any]]] = json.loads(
             self._handle.call(_text, _core.emcon_get_report))
@@ -388,13 +386,13 @@ class Stepper(Queries, Conditions, Meshes):
     def set_state(self, *, u: ArrayLike | None = None, v: ArrayLike | None = None,
                   lam: ArrayLike | None = None, active: ArrayLike | None = None,
                   time: float | None = None) -> None:
-        """Put the given parts in place of the present ones; on an error nothing changes.
+        """Replace parts of the state; on an error nothing changes.
 
-        Shapes as of the properties. Dependent nodes of ties and equations follow the others.
-        Energies and momenta are measured anew, the works stand. With `u` contact forces and
-        reactions are zero until the next step. `time` [T] is total, not before the start of the
-        present step of the deck. Raises `InputError`, and `AnalysisError` where `u` inverts an
-        element.
+        Shapes are those of the properties. Dependent nodes of ties and equations follow the others.
+        Energies and momenta are computed again; works, which are sums over time, stay. With `u`
+        contact forces and reactions are zero until the next step. `time` [T] is total time, not
+        before the start of the present step of the deck. Raises `InputError`, and `AnalysisError`
+        if `u` inverts an element.
         """
         shape = (self.n_node, self.n_dim)
         none = np.empty((0, self.n_dim))
@@ -405,13 +403,13 @@ class Stepper(Queries, Conditions, Meshes):
         self._handle.change(_set_state, self.n_node, u, v, lam, active, when)
 
     def save(self) -> Snapshot:
-        """Keep the present state. It is freed with the object that is returned."""
+        """Save the present state in memory, until the object that is returned is deleted."""
         return Snapshot(self._handle.call(_core.emcon_take_snapshot))
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back, or forward, to a state of this stepper, or of one of the same deck.
+        """Return to a saved state of this stepper, or of another one of the same deck.
 
-        What follows has the same bits. Loads and boundary values are those of now.
+        What follows has the same bits. Loads and boundary values stay as they are now.
         """
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"a state of save() is needed, not {type(snapshot).__name__}")
@@ -424,7 +422,7 @@ class Stepper(Queries, Conditions, Meshes):
     def contact(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int32]]:
         """Multipliers (contact forces, 0 where open), active flags, slave node numbers.
 
-        All of shape (n_constraint,): of all pairs, then of their guards, whose nodes may come again.
+        All of shape (n_constraint,): contacts of all pairs, then guards; a node may have several.
         """
         lam, active, label, _ = self._handle.call(_core.emcon_get_contact, self.n_constraint)
         return lam, active.astype(bool), label
@@ -432,7 +430,7 @@ class Stepper(Queries, Conditions, Meshes):
     def pressures(self) -> NDArray[np.float64]:
         """Contact pressures, 0 where open, (n_constraint,) [M/(L T^2)]: CSTR of the deck.
 
-        `contact` tells the slave nodes.
+        In the order of `contact`, which has the slave nodes.
         """
         return self._handle.call(
             lambda a: _core.emcon_get_pressures(a, self.n_constraint, no_gap=1)[:2])
@@ -445,7 +443,7 @@ class Stepper(Queries, Conditions, Meshes):
     def pairs(self) -> list[PairTotal]:
         """Totals of the last increment, one for each contact pair in the order of the deck.
 
-        A pair that holds both sides counts twice: behind it stands its reverse.
+        A pair that stops nodes of both sides counts as two, the second with sides exchanged.
         """
         total, active = self._handle.call(_core.emcon_get_pairs, self.n_pair)
         loss = self._handle.call(_core.emcon_get_pair_friction, self.n_pair)
@@ -454,15 +452,15 @@ class Stepper(Queries, Conditions, Meshes):
                 for row, n, taken in zip(total, active, loss)]
 
     def friction(self) -> Friction:
-        """How each contact rubs, in the order of `contact`; vectors along the surface."""
+        """Friction of each contact, in the order of `contact`; vectors along the surface."""
         return Friction(*self._handle.call(_core.emcon_get_friction, self.n_constraint))
 
     def verdict(self) -> dict[str, Any]:
         """The verdict on the increments that led to this state: `NAME.json` of a run of the deck.
 
-        "verdict" is "good" or "bad", "reasons" say why; with them stand the penetration that
-        geometry found, the stand-off, the largest residual accepted, the energy error, and
-        "warnings". A state that is restored has the verdict it had.
+        "verdict" is "good" or "bad", with "reasons"; further entries are the deepest overlap, the
+        stand-off, the largest residual accepted, the energy error, and "warnings". A saved state
+        contains its verdict.
         """
         verdict: dict[str, Any] = json.loads(self._handle.call(_text, _core.emcon_get_verdict))
         return verdict
@@ -482,7 +480,7 @@ class Stepper(Queries, Conditions, Meshes):
         stabilization, restitution_loss, scheme_loss, damping_loss, friction_loss,
         contact_damping_loss, contact_energy, total.
 
-        `potential` is that of given forces; total = kinetic + strain + potential
+        `potential` is that of forces from outside; total = kinetic + strain + potential
         + contact_energy - external_work.
         """
         return dict(list(self.ledger.items())[:13])

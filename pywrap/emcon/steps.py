@@ -21,7 +21,7 @@ _REQUESTS = {"NODE FILE": "NSET", "EL FILE": "ELSET", "CONTACT FILE": None, "NOD
 class Step(Cards):
     """Cards between `*STEP` and `*END STEP`; made by `Model.step`.
 
-    Conditions, settings and output requests stay for later steps until they are given anew.
+    Conditions, settings and output requests stay for later steps until they are given again.
     Methods return the step.
     """
 
@@ -46,8 +46,8 @@ class Step(Cards):
         dof     1, 2, 3 or some of them; in the plane 6: moment on the reference node of a rigid
                 body [M L^2/T^2]
         force   one for all, (n_dof,), or (k, n_dof)
-        delay   how much later the amplitude begins [T]
-        op      NEW: all forces of earlier steps go
+        delay   time by which the amplitude is shifted [T]
+        op      NEW: remove all forces of earlier steps
         """
         self._valued("CLOAD", where, dof, force,
                      {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay})
@@ -61,7 +61,7 @@ class Step(Cards):
         Loads of one step on the same place add up; those of a later step replace them.
 
         where   element set, element, or (k,) of them
-        op      NEW: all pressures and gravity of earlier steps go
+        op      NEW: remove all pressures and gravity of earlier steps
         """
         if face not in range(1, 7):
             raise InputError(f"a face is 1 to 6, not {face!r}")
@@ -71,7 +71,7 @@ class Step(Cards):
                          delay: Number | None = None, op: Op | None = None) -> Step:
         """`*DSLOAD`: pressure [M/(L T^2)], positive inwards, on all faces of a surface.
 
-        op      NEW: all pressures that earlier steps gave to surfaces go
+        op      NEW: remove all pressures on surfaces of earlier steps
         """
         return self._card("DSLOAD", {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay},
                           [(surface, "P", value)])
@@ -98,9 +98,9 @@ class Step(Cards):
                           factor: Number | None = None, tolerance: Number | None = None) -> Step:
         """`*CONSTRAINT METHOD`: NULL SPACE (default), SADDLE POINT, PENALTY or AUGMENTED LAGRANGE.
 
-        stiffness       of the last two: pressure by penetration [M/(L T)^2]
-        factor          or that by the stiffness of the elements (1)
-        tolerance       of AUGMENTED LAGRANGE: what is left of gaps, by the edge (1e-8)
+        stiffness       of the last two: pressure over penetration [M/(L T)^2]
+        factor          or stiffness in terms of that of the elements (1)
+        tolerance       of AUGMENTED LAGRANGE: largest remaining gap, in edge lengths (1e-8)
         """
         return self._card("CONSTRAINT METHOD", {"TYPE": type, "STIFFNESS": stiffness,
                                                 "FACTOR": factor, "TOLERANCE": tolerance})
@@ -120,14 +120,14 @@ class Step(Cards):
 
         The step has to be the first one and static.
 
-        amplitude       the part that is left, from 1 to 0; without one linear over the step
+        amplitude       the fraction of the overlap that remains, from 1 to 0; default linear
         """
         return self._card("CONTACT INTERFERENCE", {"SHRINK": True, "AMPLITUDE": amplitude})
 
     def contact_controls(self, *, stabilize: bool) -> Step:
-        """`*CONTACT CONTROLS`: STABILIZE, or RESET to what holds by default, for static steps.
+        """`*CONTACT CONTROLS`: STABILIZE, or RESET to the default, for static steps.
 
-        With STABILIZE a motion that nothing holds and no load works on is as small as it can be.
+        With STABILIZE a motion without support and without load is as small as possible.
         """
         return self._card("CONTACT CONTROLS", {"STABILIZE": True} if stabilize else {"RESET": True})
 
@@ -147,7 +147,7 @@ class Step(Cards):
     def mortar(self, *, integration: str | None = None, points: int | str | None = None,
                multiplier: str | None = None, normal: str | None = None,
                feature_angle: Number | None = None) -> Step:
-        """`*MORTAR`, for pairs of type MORTAR and SEGMENT; what is not given stays.
+        """`*MORTAR`, for pairs of type MORTAR and SEGMENT; other options stay as they are.
 
         integration     SEGMENTS (default) or ELEMENTS
         points          Gauss points: 2 to 10 per segment, or 1 to 10 per slave edge
@@ -171,7 +171,7 @@ class Step(Cards):
         """`*NEWTON`: KEPT (default), a factor over many increments of dynamics, or FULL.
 
         tolerance       relative residual, below 1 (default 1e-10)
-        maximum         tangents in a step at most (20), and twice as many corrections of KEPT
+        maximum         largest number of tangents in a step (20); corrections of KEPT: twice it
         polish          False: no corrections below the tolerance
         """
         ends = None if polish is None else "YES" if polish else "NO"
@@ -189,8 +189,8 @@ class Step(Cards):
         alpha             of GENERALIZED ALPHA, -1/3 to 0 (default -0.05)
         spectral_radius   of GENERALIZED ALPHA, instead: at the highest frequencies, 0 to 1
         dissipation       of ENERGY DECAYING, 0 to 1 (0.125)
-        tolerance         increments follow the error of the motion: relative, by the way that it
-                          goes (1e-2 rough, 1e-4 fine); not in steps that are `direct`
+        tolerance         increments follow the error of the motion, relative to its path (1e-2
+                          coarse, 1e-4 fine); not in steps that are `direct`
         """
         return self._card("TIME INTEGRATION", {"SCHEME": scheme, "ALPHA": alpha,
                                                "SPECTRAL RADIUS": spectral_radius,
@@ -199,11 +199,11 @@ class Step(Cards):
 
     def events(self, type: str | None = None, *, fraction: Number | None = None,
                off: bool = False) -> Step:
-        """`*EVENTS`: contact begins and ends within short increments, which the log tells.
+        """`*EVENTS`: contact begins and ends within short increments, which the log lists.
 
         type            PAIR (default): a pair meets or parts; NODE: each slave node
         fraction        of the increment of the step, 1e-6 to 1 (default 1e-3)
-        off             events of earlier steps are no longer looked for
+        off             end the search for events that an earlier step began
         """
         return self._card("EVENTS", {"TYPE": type, "FRACTION": fraction, "OFF": off or None})
 
@@ -227,8 +227,8 @@ class Step(Cards):
         variables     U, V, RF, UR, VR, RM; S, E, ENER, ELSE, ELKE, EVOL; CDIS, CSTR, CF, CSHEAR,
                       CSLIP, CNAREA, CNUM; SOF, SOM, SOMC, SOCENTER, SOAREA
         set           of nodes or elements, for NODE and EL; the surface of SECTION PRINT
-        frequency     every so many increments; 0: never
-        time_points   name of times, instead
+        frequency     number of increments between outputs; 0: none
+        time_points   name of time points, in place of `frequency`
         totals        YES or ONLY: the sums over the set, for PRINT
         name          of a section in the history; default: that of its surface
         global_axes   NODE PRINT: along the axes of the model, not those of `Model.transform`
@@ -246,5 +246,5 @@ class Step(Cards):
                           [chosen] if chosen else [])
 
     def restart(self, frequency: int | str | None = None) -> Step:
-        """`*RESTART, WRITE`: the batch program writes one every so many increments; 0: none."""
+        """`*RESTART, WRITE`: `emcon run` writes a restart file every `frequency` increments; 0: none."""
         return self._card("RESTART", {"WRITE": True, "FREQUENCY": frequency})

@@ -57,12 +57,12 @@ def _balance_lines(history: NDArray[np.void]) -> list[str]:
 
 def _rebound_lines(history: NDArray[np.void], bodies: Bodies | None) -> list[str]:
     if bodies is None:
-        return ["  rebound velocity                (masses of the bodies are not in the history)"]
+        return ["  velocities of bodies            (their masses are not in the history)"]
     body = bodies.main()
     start, end = bodies.velocity(body, 0), bodies.velocity(body, -1)
     return [f"  velocity of body {body + 1}, start      ({', '.join(f'{v:.6g}' for v in start)})"
             f"   mass {bodies.mass[body]:.6g}",
-            f"  rebound velocity, end           ({', '.join(f'{v:.6g}' for v in end)})"]
+            f"  velocity of the same, end       ({', '.join(f'{v:.6g}' for v in end)})"]
 
 
 def _effort_lines(history: NDArray[np.void], wall: float | None) -> list[str]:

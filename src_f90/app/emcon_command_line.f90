@@ -231,32 +231,35 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(25)
+      character(len=72) :: line(28)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
-         "       emcon check DECK [options]     read it, report on it, no run", &
-         "       emcon restart NAME.rst.h5      go on from a restart file", &
-         "       emcon keywords [NAME]          what decks may say", &
+         "       emcon check DECK [options]     check and describe it, no run", &
+         "       emcon restart NAME.rst.h5      continue from a restart file", &
+         "       emcon keywords [NAME]          list keywords of decks", &
          "", &
          "options:", &
          "  --output DIR       write the results into DIR, not beside the deck", &
          "  --set NAME=VALUE   set a *PARAMETER of the deck; may be repeated;", &
-         "                     without a value: lists those that there are", &
-         "  --lenient          unsupported output is left out, with warnings", &
-         "  --quiet            nothing but errors, warnings and a bad verdict", &
-         "  --strict           a bad verdict is exit code 3", &
-         "  --threads N        N threads, not as many as OMP_NUM_THREADS says, or", &
-         "                     one: the same results, to the last bit", &
-         "  --until T          restart: the last step ends at the time T; and", &
-         "  --steps FILE       it goes on with these steps, both with --output", &
-         "  --json             what check reports as one JSON object", &
+         "                     without =VALUE: lists the parameters", &
+         "  --lenient          leave out unsupported output, with warnings", &
+         "  --quiet            print errors, warnings and a bad verdict only", &
+         "  --strict           exit with code 3 if the verdict is bad", &
+         "  --threads N        number of threads (default: OMP_NUM_THREADS, or 1);", &
+         "                     results have the same bits for any number", &
+         "  --until T          restart: end the last step at time T", &
+         "  --steps FILE       restart: continue with the steps of FILE", &
+         "                     (both need --output)", &
+         "  --json             check: report as one JSON object", &
          "  --version, --help", &
          "", &
          "results:  NAME.vtkhdf fields for ParaView, NAME.csv and NAME.h5 history,", &
          "          NAME.log, NAME.json verdict, NAME.rst.h5 for a restart", &
          "exit:     0 done, 2 error in the deck or on the command line,", &
-         "          3 the analysis failed (results up to there are kept),", &
+         "          3 the analysis failed (results up to there are kept), or", &
+         "            bodies overlap by more than a tenth of an edge, or the", &
+         "            energy balance is off by more than 1e-6,", &
          "          4 cannot write, 130 interrupted", &
          "decks:    docs/deck.md"]
    end function usage

@@ -1,6 +1,6 @@
 // EMCON for C++ (C++11 and later): models that close themselves, failures as exceptions, arrays as
-// vectors. All of it stands in this header, over emcon.h, which says what each function does; what
-// has no name here is called by Model::call:
+// vectors. This header contains all of it; emcon.h describes each function. Model::call calls the
+// functions that have no method here:
 //
 //    emcon::Model ring = emcon::Model::open("ring.inp", "h=0.05");
 //    ring.run(1.0);
@@ -40,8 +40,8 @@ struct FileError : Error { using Error::Error; };
 struct InternalError : Error { using Error::Error; };
 struct Interrupted : Error { using Error::Error; };
 
-// To be thrown by what a model was given, at a state where there is no energy: the step is tried
-// again in smaller parts.
+// Throw this in a law, potential or force for a state without energy: the step is then repeated in
+// smaller parts.
 struct Outside : std::exception {
    const char *what() const noexcept override { return "there is no energy at this state"; }
 };
@@ -69,7 +69,7 @@ using PointFunction = std::function<void(int, int, const double *, double *, dou
 using ForceFunction = std::function<void(int, const double *, const double *, double *, double *,
                                          double *, double *)>;
 
-// A state that was kept; it outlives its model.
+// A saved state; it stays valid if its model is closed.
 class Snapshot {
 public:
    explicit Snapshot(emcon_snapshot *kept) : kept_(kept) {}
@@ -87,21 +87,21 @@ struct Verdict {
    std::string json;
 };
 
-// Of each possible contact; NaN is the gap where no surface is near. With *FRICTION its traction,
-// slip, vectors of n_dim - 1 components, and the length of that way; `way` is 1 where it sticks, 2
-// where it slides.
+// For each possible contact; the gap is NaN if no surface is near. With *FRICTION its traction and
+// slip, vectors of n_dim - 1 components, and the length of its path; `way` is 1 if it sticks, 2 if
+// it slides.
 struct Contact {
    std::vector<double> lam, pressure, gap, shear, slip, path;
    std::vector<int> is_active, label, pair, way;
 };
 
-// Of each possible contact in the step of a host: `way` is 0 where it is open, 1 where it acts and does
-// not slide, 2 where it slides; slip and friction are vectors of n_dim - 1 components.
+// For each possible contact in the step of a host: `way` is 0 if it is open, 1 if it acts and does
+// not slide, 2 if it slides; slip and friction are vectors of n_dim - 1 components.
 struct Slips {
    std::vector<int> way;
    std::vector<double> slip, friction;
 
-   // The energy that friction has taken in the step.
+   // The energy dissipated by friction in the step.
    double loss() const
    {
       double sum = 0;
@@ -130,7 +130,7 @@ public:
       return made(emcon_open, deck.c_str(), parameters.c_str(), is_lenient);
    }
 
-   // Read without building: give the model what a deck cannot say, then `build`.
+   // Read without building: give the model its functions, then `build`.
    static Model read(const std::string &deck, const std::string &parameters = "",
                      bool is_lenient = false)
    {
@@ -332,7 +332,7 @@ public:
       call(emcon_add_pair, slave, master, formulation, &options);
    }
 
-   // Nodes whose freedoms the host moves by itself.
+   // Nodes whose displacements the host prescribes.
    void hold(const std::vector<int> &node)
    {
       const emcon_sizes of = sizes();
@@ -345,7 +345,7 @@ public:
       call(emcon_hold, of.n_node, held.data());
    }
 
-   // Unknowns w of the host's from here on, as emcon_set_map has it; `newton` moves the nodes by it.
+   // Use unknowns w of the host from now on: see emcon_set_map. `newton` then solves for these.
    void set_map(const emcon_csr &map)
    {
       call(emcon_set_map, &map);
@@ -436,7 +436,7 @@ public:
 
    // ---- what is given, between reading and building ----
 
-   // What is thrown by a function that was given ends the call that reached it, and is thrown on.
+   // An exception of such a function ends the call of the library, which throws it again.
 
    void give_law(const std::string &name, PointFunction law)
    {

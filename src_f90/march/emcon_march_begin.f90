@@ -370,7 +370,7 @@ contains
       type(step_t), intent(in) :: step
       type(error_t), allocatable, intent(out) :: error
       logical :: is_slave(size(scene%x, 2))
-      character(len=:), allocatable :: moved
+      character(len=:), allocatable :: moved, left
       real(wp) :: share
       integer :: i, n, body
 
@@ -391,9 +391,12 @@ contains
       call layer_share(self%layer, self%system, share, body)
       if (body > 0) moved = "; " // to_text(100.0_wp*share, 2) // " % of the mass of body " // &
          to_text(body) // " moves into its interior, of other bodies less"
+      left = ""
+      if (count(is_slave) > n) left = "; " // to_text(count(is_slave) - n) // &
+         " slave nodes keep theirs: they are prescribed, tied or given mass, or too few " // &
+         "neighbours hold them"
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
-         " nodes" // moved // "; " // to_text(count(is_slave) - n) // " slave nodes keep " // &
-         "theirs: they are prescribed, tied or given mass, or too few neighbours hold them")
+         " nodes" // moved // left)
    end subroutine begin_massless
 
    !> Tell of pairs whose surfaces were to be massless and are not; one side of two is enough.

@@ -332,12 +332,12 @@ contains
          call row_begin(row, "advice", "body")
          call row_put(row, "body", i, " #")
          call row_put(row, "stiffer", body(i)%modulus/softest, &
-            " is # times stiffer than the softest one: as *RIGID BODY ")
+            " is # times stiffer than the softest one: as a *RIGID BODY it saves ")
          call row_put(row, "fewer_percent", nint(100.0_wp*real(body(i)%n_unknown, wp) &
-            /real(sum(body%n_unknown), wp)), "# % fewer unknowns")
+            /real(sum(body%n_unknown), wp)), "# % of the unknowns")
          ! Of the strain energy of a contact it stores no more than this.
          call row_put(row, "rebound_percent", 100.0_wp*softest/body(i)%modulus, &
-            "; expected change of rebound below # %")
+            "; the rebound would change by less than # %")
          ! In bending it stores more, by the square of this and more.
          thickness = minval(body(i)%high - body(i)%low)/maxval(body(i)%high - body(i)%low)
          if (thickness < compact) call row_put(row, "thickness", thickness, &

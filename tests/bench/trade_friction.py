@@ -116,7 +116,7 @@ def main():
     parser.add_argument("--update", action="store_true", help="write into docs/trade.md")
     parser.add_argument("--rounds", type=int, default=1, help="runs of each (1)")
     options = parser.parse_args()
-    lines = table(["scene", "knob", "CPU", "Newton", "cuts", "displacements", "taken by friction",
+    lines = table(["scene", "knob", "CPU", "Newton", "cuts", "displacements", "dissipated by friction",
                    "by damping", "energy", "law"],
                   [line for scene in SCENES for line in lines_of(*scene, options.rounds)])
     print(*lines, sep="\n")

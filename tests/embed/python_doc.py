@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT/"docs"/f"{name}.md" for name in ("python", "tutorial", "howto", "hosts")]
+PAGES = [ROOT/"docs"/f"{name}.md" for name in ("python", "tutorial", "howto", "hosts", "embedding")]
 #: Languages of blocks that are files or run.
 RUNS = {"python", "sh run", "text deck"}
 #: Languages of blocks that show what is printed.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import re
 import resource
 import signal
 import sys
@@ -1037,14 +1036,3 @@ def resident() -> float:
     """Memory in use, bytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages*resource.getpagesize()
-
-
-def test_examples_of_the_docs() -> None:
-    text = (Path(__file__).parents[2]/"docs"/"embedding.md").read_text(encoding="utf-8")
-    examples = [block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-                if "emcon.interface" not in block]
-    assert len(examples) >= 3
-    names: dict[str, Any] = {}
-    for example in examples:
-        exec(compile(example, "embedding.md", "exec"), names)
-    assert abs(names["after"]["total"] - names["before"]["total"]) < 1e4*EPS

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -81,15 +80,6 @@ def test_hosts_in_two_threads_get_the_bits_that_they_get_alone() -> None:
         for expected, found in zip(alone, pool.map(lambda name: collide(name, 20, 0.02), names)):
             assert (found.drift, found.after) == (expected.drift, expected.after)
             assert (found.momenta == expected.momenta).all()
-
-
-def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (Path(__file__).parents[2]/"docs"/"embedding.md").read_text(encoding="utf-8")
-    examples = [block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-                if "emcon.interface" in block]
-    for example, said in zip(examples, ("(14, 10)\n", "3 True\n"), strict=True):
-        exec(compile(example, "embedding.md", "exec"), {})
-        assert capsys.readouterr().out.endswith(said)
 
 
 # ---- gradients -----------------------------------------------------------------------------------

@@ -55,7 +55,7 @@ def report_ring(started, _):
                      size(max(0.0, -least)), size(balance(history)),
                      *(size(drift(history[name])) for name in ("px", "py", "lz")),
                      f"{history['newton'][1:].mean():.1f}", int(history["cuts"].sum())))
-    return table(["type", "method", "sides", "taken, by the energy", "given by it", "balance", "px",
+    return table(["type", "method", "sides", "dissipated, over the energy", "gained from it", "balance", "px",
                   "py", "lz", "Newton", "cuts"], rows)
 
 

@@ -306,7 +306,7 @@ def report_ring(started, _):
                      size(balance(history)), *(size(drift(history[name]))
                                                for name in ("px", "py", "lz")),
                      f"{history['newton'][1:].mean():.1f}", int(history["cuts"].sum()), law(run)))
-    return table(["mu", "type", "method", "sides", "taken by friction", "given by it", "balance", "px",
+    return table(["mu", "type", "method", "sides", "dissipated by friction", "gained from it", "balance", "px",
                   "py", "lz", "Newton", "cuts", "law"], rows)
 
 

@@ -94,7 +94,7 @@ def damping(futures, _):
                      f"{100*abs(found/exact - 1):.2f} %",
                      f"{history['damping_loss'][-1]/total[0]:.4f}", size(damped_balance(history))))
     return table(["`ALPHA`", "`BETA`", "increments in a period", "ratio found", "of the oscillator",
-                  "off by", "taken, by the energy", "energy"], rows)
+                  "off by", "dissipated, over the energy", "energy"], rows)
 
 
 CHAPTERS = [Chapter("soft_spring", start_spring, spring), Chapter("soft_bar", start_bar, bars),
