@@ -36,6 +36,8 @@ module emcon_edge_choice_space
       clear = 0.1_wp
    !> So deep, by the edge, two edges may be in each other.
    real(wp), parameter :: deepest = 0.3_wp
+   !> The same, more than an end of one of them at which its body ends is off: there nodes hold.
+   real(wp), parameter :: room_beside = 0.02_wp
    !> Heights that are larger by this than any that counts are so whatever rounding does.
    real(wp), parameter :: far = 1.001_wp
 
@@ -53,6 +55,7 @@ module emcon_edge_choice_space
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: reach = 0.0_wp                      !! among edges up to there [L]
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
+      logical :: gives_way = .false.                  !! overlaps store energy: they stay
       type(edge_stencil_t), allocatable :: stencil(:)    !! by slave
    end type edge_choice_t
 
@@ -207,6 +210,8 @@ contains
       if (any(max(-crossing%place, crossing%place - 1.0_wp)*length > self%reach)) return
       gap = new%side*crossing%height
       if (gap - self%offset < -deepest*minval(length) .or. gap > self%reach) return
+      if (-gap > way_out(self%edges, new, crossing, length) + room_beside*minval(length) .and. &
+         .not. self%gives_way) return
       least = least_turn
       if (gap - self%offset < -inside*minval(length) .or. (within > clear .and. &
          self%edges%bends(m))) least = -hollow
@@ -301,6 +306,24 @@ contains
 
       beyond = max(0.0_wp, maxval(max(-crossing%place, crossing%place - 1.0_wp)) - begins_beyond)
    end function beyond_ends
+
+   !> How far from a crossing an end is at which a body ends, the nearest; past it 0, huge if there
+   !> is none [L].
+   pure real(wp) function way_out(edges, pair, crossing, length) result(way)
+      type(outline_edges_t), intent(in) :: edges
+      type(edge_stencil_t), intent(in) :: pair   !! that cross
+      type(crossing_t), intent(in) :: crossing
+      real(wp), intent(in) :: length(2)          !! of the edges [L]
+      integer :: k, which(2)
+
+      way = huge(way)
+      which = [pair%edge, pair%master]
+      do k = 1, 2
+         if (edges%at_rim(1, which(k))) way = min(way, crossing%place(k)*length(k))
+         if (edges%at_rim(2, which(k))) way = min(way, (1.0_wp - crossing%place(k))*length(k))
+      end do
+      way = max(0.0_wp, way)
+   end function way_out
 
    !> The ends of the edge that place `i` is of.
    pure function edge_choice_slave(self, i) result(node)

@@ -94,6 +94,7 @@ contains
       if (self%n_constraint == 0) then
          call self%has_looked(huge(1.0_wp))
       else
+         self%choice%gives_way = self%step%has_compliance
          call edge_choice_update(self%choice, x, u0, du, self%reach)
          call self%has_looked(self%choice%near%clearance)
       end if

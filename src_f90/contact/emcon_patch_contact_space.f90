@@ -261,6 +261,7 @@ contains
       end if
       call position_memo_take(self%memo, self%near%node, x, u0)
       self%chosen_reach = self%reach
+      scope%gives_way = self%step%has_compliance
       associate (list => self%near%candidates)
          do i = 1, self%n_constraint
             associate (item => self%sides%frames%point(self%frame(i)))

@@ -11,7 +11,7 @@ module emcon_patch_near_space
    implicit none
    private
    public :: patch_scope_t, patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
-      patch_near_goes_on, patch_outline_t, patch_outline, patch_outline_misses
+      patch_near_goes_on, patch_near_pass, patch_outline_t, patch_outline, patch_outline_misses
 
    !> A triangle faces a frame if the cosine of their normals is below this.
    real(wp), parameter :: facing = -0.25_wp
@@ -21,6 +21,9 @@ module emcon_patch_near_space
    real(wp), parameter :: as_near = 1.0e-6_wp
    !> What is behind a triangle by more than this, per facet, is in front of another one.
    real(wp), parameter, public :: room_behind = 0.2_wp
+   !> The same where another frame of the node faces that one, or the node is past the end of the
+   !> surface: there it is beside the body, not inside of it.
+   real(wp), parameter :: room_beside = 0.02_wp
    !> Beside triangles of slave facets a surface that ends fades over this part of a facet.
    real(wp), parameter, public :: narrow_flange = 0.05_wp
 
@@ -31,6 +34,8 @@ module emcon_patch_near_space
                                                  !! not seen; not allocated: none of them
       real(wp) :: beside = huge(1.0_wp)          !! a triangle of the slave sees what is beside it
                                                  !! by no more [L]
+      logical :: gives_way = .false.             !! points may be inside of a surface, and store
+                                                 !! energy by that: what they are behind stays
    end type patch_scope_t
 
    !> A triangle of the slave as it sees what is beside it.
@@ -43,6 +48,7 @@ module emcon_patch_near_space
    type :: patch_near_t
       integer :: n = 0
       integer :: point = 0                       !! of the slave, that looks
+      logical :: gives_way = .false.             !! as its scope does
       real(wp) :: along(3) = 0.0_wp              !! normal of its frame, of which the list is
       integer, allocatable :: triangle(:)        !! (n) ascending
       integer, allocatable :: beyond(:, :)       !! (3, n) beyond each side, of these; 0: none
@@ -52,6 +58,7 @@ module emcon_patch_near_space
       logical, allocatable :: is_listed(:)       !! (n) the patch looks at it
       logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest,
                                                  !! or fades where it meets that
+      logical, allocatable :: is_past(:)         !! (n) the point is past an end of it, and lower
       logical, allocatable :: is_beside(:)       !! (n) so far off that the patch cannot see it
    end type patch_near_t
 
@@ -70,6 +77,7 @@ contains
       integer :: k, t
 
       near%point = i
+      near%gives_way = scope%gives_way
       origin = point_origin(sides, i, x, u)
       associate (start => sides%triangles%split%start, f => scope%facet)
          near%triangle = [((t, t = start(f(k)), start(f(k) + 1) - 1), k = 1, size(f))]
@@ -77,8 +85,8 @@ contains
       near%n = size(near%triangle)
       call find_beyond(near, sides, scope%facet)
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
-      allocate(near%is_listed(near%n), near%is_apart(near%n), near%is_beside(near%n), &
-         source=.false.)
+      allocate(near%is_listed(near%n), near%is_apart(near%n), near%is_past(near%n), &
+         near%is_beside(near%n), source=.false.)
       if (allocated(scope%is_far)) then
          associate (start => sides%triangles%split%start, f => scope%facet)
             near%is_beside = [((scope%is_far(k), t = start(f(k)), start(f(k) + 1) - 1), &
@@ -225,7 +233,7 @@ contains
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame               !! 1 to the number of all frames
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp) :: best, least, shortest
+      real(wp) :: best, least, shortest, elsewhere
       integer :: g, t
 
       nearest = 0
@@ -237,12 +245,14 @@ contains
             associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal( &
                   sides%frames, g, sides%frames%base(i), x, u), g = first, last)], &
                   [3, last - first + 1])))
+               elsewhere = minval(near%distance, minloc(cosine, 2) /= frame - first + 1 .and. &
+                  minval(cosine, 2) < facing)
                do t = 1, near%n
                   if (minloc(cosine(t, :), 1) /= frame - first + 1) cycle
                   associate (own => cosine(t, frame - first + 1), &
                         room => as_near*sides%triangles%size(near%triangle(t)))
                      if (own >= facing) cycle
-                     if (is_hidden(t, room_behind*min(sides%frames%size(i), &
+                     if (is_hidden(t, min(sides%frames%size(i), &
                         sides%triangles%size(near%triangle(t))))) cycle
                      if (near%distance(t) > least + room) cycle
                      if (near%distance(t) > least - room .and. own >= best - as_near) cycle
@@ -258,16 +268,68 @@ contains
    contains
 
       !> Is the node behind a triangle, but nearer to another by more than `room`? Then that is in
-      !> front of it.
-      pure logical function is_hidden(t, room)
+      !> front of it. Of one that another frame of the node faces less is enough.
+      pure logical function is_hidden(t, size_of)
          integer, intent(in) :: t
-         real(wp), intent(in) :: room            !! [L]
+         real(wp), intent(in) :: size_of         !! of the shorter facet of both sides [L]
 
+         is_hidden = near%is_past(t)
+         if (is_hidden) return
          is_hidden = dot_product(near%corner(:, 1, t), near%normal(:, t)) > 0.0_wp .and. &
-            near%distance(t) > shortest + room
+            (near%distance(t) > shortest + room_behind*size_of .or. &
+            (near%distance(t) > elsewhere + room_beside*size_of .and. .not. near%gives_way))
       end function is_hidden
 
    end function patch_near_nearest
+
+   !> Is a node beside what is listed: behind the nearest triangle, and past an end of the surface
+   !> by more than that? There it is in front of another side of the body, and what the list shows
+   !> of the surface beyond its end is not there. What is listed is then marked as such.
+   pure subroutine patch_near_pass(near, sides, nearest, x, u, is_past)
+      type(patch_near_t), intent(inout) :: near  !! with its list
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: nearest             !! 1 to near%n
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      logical, intent(out) :: is_past            !! it is
+      real(wp) :: depth, size_of
+      integer :: t
+
+      is_past = .false.
+      if (sides%frames%of_triangles .or. near%gives_way) return
+      size_of = sides%triangles%size(near%triangle(nearest))
+      depth = dot_product(near%corner(:, 1, nearest), near%normal(:, nearest))
+      if (depth <= room_beside*min(size_of, sides%frames%size(near%point))) return
+      if (near%distance(nearest)**2 <= 2.0_wp*depth**2) return
+      do t = 1, near%n
+         if (.not. near%is_listed(t)) cycle
+         if (near%distance(t) > near%distance(nearest) + as_near*size_of) cycle
+         is_past = ends_there(near, sides, t, x, u)
+         if (is_past) exit
+      end do
+      if (is_past) near%is_past = near%is_past .or. near%is_listed
+   end subroutine patch_near_pass
+
+   !> Is the place of a triangle that is nearest to the contact point on a sharp side at which the
+   !> list ends?
+   pure logical function ends_there(near, sides, t, x, u)
+      type(patch_near_t), intent(in) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: t                   !! 1 to near%n
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      type(nearest_t) :: nearest
+      integer :: k
+
+      ends_there = .false.
+      call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], near%corner(:, :, t))
+      do k = 1, 3
+         ! The corner that is not at side k.
+         if (nearest%weight(1 + mod(k + 1, 3)) > 0.0_wp) cycle
+         if (.not. sides%triangles%is_ridge(k, near%triangle(t))) cycle
+         ends_there = .not. patch_near_goes_on(near, sides, sides%triangles%beyond(k, &
+            near%triangle(t)), x, u)
+         if (ends_there) return
+      end do
+   end function ends_there
 
    !> Find what is of another layer than the nearest triangle. What faces `normal` rises by no more
    !> than its slope allows over the way between them; what rises by more hangs together with the

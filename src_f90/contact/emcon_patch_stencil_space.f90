@@ -11,7 +11,8 @@ module emcon_patch_stencil_space
    use emcon_patch_look_space, only : patch_t
    use emcon_patch_moments_space, only : patch_triangle
    use emcon_patch_near_space, only : narrow_flange, patch_near_find, patch_near_goes_on, &
-      patch_near_list, patch_near_nearest, patch_near_t, patch_scope_t, room_behind
+      patch_near_list, patch_near_nearest, patch_near_pass, patch_near_t, patch_scope_t, &
+      room_behind
    use emcon_patch_sides_space, only : flip_signs, frame_normal, patch_sides_t, sides_holds, &
       sides_in_plane, sides_place, sides_point
    use emcon_rotation, only : cross_product
@@ -69,16 +70,21 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(patch_near_t) :: near
       real(wp) :: normal(3)
+      logical :: is_past
       integer :: i, nearest
 
       self%triangle = 0
       if (size(scope%facet) == 0) return
       i = sides%frames%point(frame)
       call patch_near_find(near, sides, i, scope, x, u)
-      nearest = patch_near_nearest(near, sides, frame, x, u)
-      if (nearest == 0) return
       normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
-      call patch_near_list(near, sides, nearest, normal, x, u)
+      do
+         nearest = patch_near_nearest(near, sides, frame, x, u)
+         if (nearest == 0) return
+         call patch_near_list(near, sides, nearest, normal, x, u)
+         call patch_near_pass(near, sides, nearest, x, u, is_past)
+         if (.not. is_past) exit
+      end do
       if (.not. any(near%is_listed .and. .not. near%is_beside)) return
       self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
          *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)

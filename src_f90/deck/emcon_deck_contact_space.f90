@@ -48,7 +48,8 @@ contains
             if (size(facet, 2) == 0) cycle
             if (any(facet(1, :) == 0)) cycle
             call check_sides(reader, scene, surface, facet, title)
-            call check_shapes(reader, scene, surface, facet, title)
+            if (.not. reader%doubt%positions) call check_shapes(reader, scene, surface, facet, &
+               title)
          end associate
       end do
    end subroutine check_contact_space

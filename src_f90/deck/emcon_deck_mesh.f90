@@ -413,7 +413,8 @@ contains
       do k = 2, size(node)
          if (all(node(:k - 1) /= node(k))) cycle
          call data_error(reader, data, "element " // to_text(element) // " names node " &
-            // to_text(label(k)) // " twice")
+            // to_text(label(k)) // " twice; elements with collapsed sides are not computed: " &
+            // "mesh with triangles or tetrahedra there")
          node = 0
          return
       end do

@@ -325,6 +325,9 @@ contains
       mu = 0.0_wp
       associate (young => constant(1), nu => constant(2))
          call claim(young > 0.0_wp, "E", young, "must be positive", fault)
+         call claim(nu < 0.5_wp .or. nu > 0.5_wp, "nu", nu, "must lie between -1 and 0.5; what " &
+            // "is incompressible is computed with 0.49 to 0.4999 and C3D8H, CPE4H or elements " &
+            // "with nodes between corners", fault)
          call claim(nu > -1.0_wp .and. nu < 0.5_wp, "nu", nu, "must lie between -1 and 0.5", fault)
          if (fault == "") call lame_constants(young, nu, lam, mu)
       end associate

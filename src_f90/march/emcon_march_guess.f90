@@ -19,7 +19,8 @@ module emcon_march_guess
 contains
 
    !> First guess of the motion, and the motion and velocity of prescribed freedoms, with the offset
-   !> of docs/theory.md, eq. (4).
+   !> of docs/theory.md, eq. (4). A static step has no velocities: where some nodes had the speed at
+   !> which they are driven and all others none, there would be kinetic energy of no motion.
    subroutine march_guess(self, scene, start, h, is_at_rest)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -50,6 +51,7 @@ contains
                call prescribed_motion(scene, step, step%prescribed(k), finish, &
                   state%u_start, u, v)
                self%motion%du(a, i) = u - state%u(a, i)
+               if (.not. (has_inertia .or. self%explicit%is_on)) v = 0.0_wp
                self%end_state%v(a, i) = v
                if (self%explicit%is_on) cycle
                if (has_inertia) then

@@ -4,6 +4,7 @@
 !> A surface may end where its body goes on: whether an edge of it is sharp, and which triangles
 !> meet in it, is told by the outer faces of the elements. Source: docs/theory.md, section 14.
 module emcon_outline_edges_space
+   use emcon_csr, only : csr_list_users
    use emcon_element_kind, only : max_face_nodes
    use emcon_errors, only : error_t
    use emcon_facet_groups, only : find_turns, ridge_angle, turn_tol
@@ -24,6 +25,8 @@ module emcon_outline_edges_space
       outline_edges_nodes
 
    integer, parameter :: most_corners = 4
+   !> Edges go on along each other if the cosine between them is more.
+   real(wp), parameter :: along_edge = 0.8_wp
 
    !> Edges of one or two surfaces. Points are nodes and virtual centres of faces.
    type :: outline_edges_t
@@ -36,6 +39,7 @@ module emcon_outline_edges_space
       logical, allocatable :: is_sharp(:)        !! (n) outwards, in the reference
       logical, allocatable :: is_spoke(:)        !! (n) to a virtual centre; else a side of faces
       logical, allocatable :: is_bare(:)         !! (n) contact of nodes does not hold the last end
+      logical, allocatable :: at_rim(:, :)       !! (2, n) a sharp edge runs across that end
       logical, allocatable :: bends(:)           !! (n) the angle between its triangles may change
       real(wp), allocatable :: breadth(:)        !! (n) of the smaller face there, reference [L]
       integer, allocatable :: surface(:)         !! (n) 1, 2
@@ -75,7 +79,46 @@ contains
       call add_spokes(self, own, outer, split, goes_on, n)
       self%n = size(self%is_sharp)
       call find_bending(self, scene)
+      call find_rims(self, scene%x)
    end subroutine outline_edges_add
+
+   !> At which ends of edges sharp ones run across: the body ends there.
+   pure subroutine find_rims(self, x)
+      type(outline_edges_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node of the scene) reference [L]
+      real(wp) :: along(3, self%n)
+      integer, allocatable :: start(:), at(:)
+      integer :: i, j, k
+
+      along = ways(self, x)
+      call csr_list_users(size(self%node, 2), [(1 + 2*k, k = 0, self%n)], &
+         reshape(self%ends, [2*self%n]), start, at)
+      if (allocated(self%at_rim)) deallocate(self%at_rim)
+      allocate(self%at_rim(2, self%n), source=.false.)
+      do i = 1, self%n
+         do k = 1, 2
+            do j = start(self%ends(k, i)) + 1, start(self%ends(k, i) + 1)
+               self%at_rim(k, i) = self%at_rim(k, i) .or. (self%is_sharp(at(j)) .and. &
+                  abs(dot_product(along(:, i), along(:, at(j)))) < along_edge)
+            end do
+         end do
+      end do
+   end subroutine find_rims
+
+   !> Along each edge, of length 1.
+   pure function ways(self, x) result(along)
+      type(outline_edges_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node of the scene) reference [L]
+      real(wp) :: along(3, self%n), still(3, size(x, 2))
+      integer :: i
+
+      still = 0.0_wp
+      do i = 1, self%n
+         along(:, i) = outline_edges_place(self, self%ends(2, i), self%node(1, self%ends(1, i)), &
+            x, still)
+         along(:, i) = along(:, i)/max(sqrt(dot_product(along(:, i), along(:, i))), tiny(along))
+      end do
+   end function ways
 
    !> Which edges bend: those with all nodes in one rigid body, or held, do not.
    pure subroutine find_bending(self, scene)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contact_space_scenes import faces
+from contact_space_scenes import bodies, faces
 from scene_tools import Run, run_deck
 from space_mesh import Block
 
@@ -223,3 +223,17 @@ def test_nodes_that_the_deck_moves(k: int, tmp_path: Path) -> None:
     assert z[foot] == pytest.approx(z[head].mean(), abs=1.0e-9)
     # Sides are free: the stress is E times the strain.
     assert force == pytest.approx(E*0.03, rel=1.0e-6)
+
+
+def test_what_an_amplitude_drives_has_no_kinetic_energy(tmp_path: Path) -> None:
+    """A static step has no velocities, of driven nodes neither: they may move at any speed."""
+    block = Block("C3D8", (1, 1, 2))
+    text = (bodies([block], [faces(block)], f"*ELASTIC\n{E}, {NU}\n*DENSITY\n1.\n")
+            + "*NSET, NSET=FOOT\n" + "".join(f"{k}\n" for k in block.on(2, 0))
+            + "*NSET, NSET=HEAD\n" + "".join(f"{k}\n" for k in block.on(2, 1))
+            + "*AMPLITUDE, NAME=A\n0., 0., 1., .1\n*BOUNDARY\nFOOT, 1, 3\n*STEP\n*STATIC\n.25, 1.\n"
+            + "*BOUNDARY, AMPLITUDE=A\nHEAD, 3, 3, 1.\n*NODE FILE\nV\n*END STEP\n")
+    run = ran(tmp_path, text)
+    assert run.history["strain"][-1] > 0.0
+    assert (run.history["kinetic"] == 0.0).all()
+    assert np.abs(run.fields()["velocity"]).max() == 0.0
