@@ -113,8 +113,8 @@ contains
       if (allocated(error)) call self%free()
    end subroutine mumps_analyse
 
-   !> When each unknown is eliminated, from 1; none where MUMPS has to find an order itself: where the
-   !> pattern is not symmetric, and for saddle points, whose pivots by value it foresees.
+   !> When each unknown is eliminated, from 1; none where MUMPS has to find an order itself: where
+   !> the pattern is not symmetric, and for saddle points, whose pivots by value it foresees.
    subroutine find_place(self, place)
       type(mumps_t), intent(in) :: self          !! with the pattern
       integer(c_int), allocatable, intent(out) :: place(:)
