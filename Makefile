@@ -1,7 +1,8 @@
 # EMCON. `make help` lists what can be made.
 #
 # MODE=release|debug|sanitize|coverage, PRECISION=single|double|quad (of the state; matrices are double),
-# LICENSE=permissive (without SuiteSparse, whose solvers are under the GPL): a folder for each.
+# LICENSE=permissive (without UMFPACK, which is under the GPL): a folder for each. The objects of both
+# licences are the same but for two.
 # V=1 shows commands, FFLAGS=... and CFLAGS=... are added to the flags below.
 # Compiler and libraries are looked up once, by .ci/setup, into build/config.mk.
 
@@ -9,8 +10,9 @@ MODE ?= release
 PRECISION ?= double
 LICENSE ?= gpl
 PREFIX ?= /usr/local
-BUILD := build/$(MODE)$(if $(filter-out double,$(PRECISION)),-$(PRECISION))$(if $(filter-out gpl,$(LICENSE)),-$(LICENSE))
-O := $(BUILD)/obj
+COMMON := build/$(MODE)$(if $(filter-out double,$(PRECISION)),-$(PRECISION))
+BUILD := $(COMMON)$(if $(filter-out gpl,$(LICENSE)),-$(LICENSE))
+O := $(COMMON)/obj
 ifeq ($(filter $(MODE),release debug sanitize coverage),)
 $(error MODE is release, debug, sanitize or coverage, not '$(MODE)')
 endif
@@ -40,8 +42,8 @@ Q := $(if $(V),,@)
 
 # Before anything else, unless build/config.mk was written on this machine: help and clean do
 # without. What the caller sets in place of a search is handed on.
-SETUP = FC='$(FC)' CC='$(CC)' $(foreach v,PYTHON HDF5_CFLAGS HDF5_LIBS UMFPACK_CFLAGS UMFPACK_LIBS \
-	MUMPS_CFLAGS MUMPS_LIBS LAPACK_LIBS,$(if $(findstring command,$(origin $v)),$v='$($v)')) .ci/setup
+SETUP = FC='$(FC)' CC='$(CC)' $(foreach v,PYTHON HDF5_CFLAGS HDF5_LIBS UMFPACK_LIBS \
+	MUMPS_CFLAGS MUMPS_LIBS ORDERING_LIBS LAPACK_LIBS,$(if $(findstring command,$(origin $v)),$v='$($v)')) .ci/setup
 ifneq ($(filter-out help clean,$(MAKECMDGOALS)),)
 $(shell $(SETUP) system >&2)
 ifneq ($(.SHELLSTATUS),0)
@@ -74,33 +76,33 @@ LIB_SRC := $(wildcard $(addsuffix *.f90,$(filter-out %/app/,$(ROOMS))) \
 	$(addsuffix *.F90,$(filter-out %/app/,$(ROOMS))))
 LIB_C := $(wildcard $(addsuffix *.c,$(filter-out %/app/,$(ROOMS))))
 BORDER := src_f90/border
-MADE := $(if $(wildcard $(BORDER)/emcon.h),$(addprefix $(BUILD)/made/,emcon_c_types.f90 emcon_c.f90))
+MADE := $(if $(wildcard $(BORDER)/emcon.h),$(addprefix $(COMMON)/made/,emcon_c_types.f90 emcon_c.f90))
 LIB_SRC += $(MADE)
 APP_SRC := $(wildcard src_f90/app/*.f90)
 APP_C := $(wildcard src_f90/app/*.c)
 KERNEL_SRC := $(wildcard tests/kernels/*.f90 tests/kernels/*.F90)
-ifeq ($(LICENSE),permissive)
-UMFPACK_CFLAGS :=
-UMFPACK_LIBS :=
-GPL := %emcon_umfpack.f90 %emcon_cholmod.f90 %emcon_cholmod_shim.c %test_umfpack.f90 %test_cholmod.f90 \
-	%test_supernodal.f90
-LIB_SRC := $(filter-out $(GPL),$(LIB_SRC))
-LIB_C := $(filter-out $(GPL),$(LIB_C))
-KERNEL_SRC := $(filter-out $(GPL),$(KERNEL_SRC))
-endif
 SRC := $(LIB_SRC) $(APP_SRC) $(KERNEL_SRC)
+ifeq ($(LICENSE),permissive)
+UMFPACK_LIBS :=
+GPL := %emcon_umfpack.f90 %test_umfpack.f90
+LIB_SRC := $(filter-out $(GPL),$(LIB_SRC))
+KERNEL_SRC := $(filter-out $(GPL),$(KERNEL_SRC))
+# The sources that know of it.
+KNOWING := $(O)/emcon_solver_kinds.o $(O)/main.o
+endif
 INC := $(wildcard $(addsuffix *.inc,$(ROOMS)))
-vpath %.f90 $(ROOMS) tests/kernels $(BUILD)/made
+vpath %.f90 $(ROOMS) tests/kernels $(COMMON)/made
 vpath %.F90 $(ROOMS) tests/kernels
 vpath %.c $(ROOMS)
-objects = $(addprefix $(O)/,$(addsuffix .o,$(basename $(notdir $(1)))))
+objects = $(foreach o,$(addprefix $(O)/,$(addsuffix .o,$(basename $(notdir $(1))))),$(if \
+	$(filter $(KNOWING),$(o)),$(BUILD)/obj/$(notdir $(o)),$(o)))
 LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
 APP_OBJ := $(call objects,$(APP_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(APP_C)))
 
 # The C functions are made from the header and the procedures that they stand for: written only where
 # they differ, so that an edit of a body makes none of them new.
-$(MADE): $(BUILD)/made/stamp ; +@:
-$(BUILD)/made/stamp: src_f90/make_c.py src_f90/c_header.py $(BORDER)/emcon.h \
+$(MADE): $(COMMON)/made/stamp ; +@:
+$(COMMON)/made/stamp: src_f90/make_c.py src_f90/c_header.py $(BORDER)/emcon.h \
 		$(wildcard $(BORDER)/*.f90 src_f90/stepper/*.f90)
 	@mkdir -p $(@D) && $(PYTHON) $< $(BORDER)/emcon.h $(@D) $(filter %.f90,$^) && touch $@
 
@@ -136,19 +138,18 @@ LDFLAGS_sanitize := $(SANITIZE) -static-libubsan
 FFLAGS_coverage := -O0 -g1 --coverage -fprofile-update=atomic
 CFLAGS_coverage := -O0 -g1 --coverage -fprofile-update=atomic
 LDFLAGS_coverage := --coverage
-FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(if $(GPL),-DEMCON_PERMISSIVE) \
-	$(FFLAGS)
-CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(MUMPS_CFLAGS) $(CFLAGS)
+FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(FFLAGS)
+CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(MUMPS_CFLAGS) $(CFLAGS)
 # The vector unit of the loops over elements side by side: that of this machine's level, up to AVX2.
 # VECTOR= builds for all machines, -march=native -mprefer-vector-width=512 takes AVX-512 where it is.
 VECTOR ?= $(if $(shell grep -m1 -o -w avx2 /proc/cpuinfo 2> /dev/null),-march=x86-64-v3)
-LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
+LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(ORDERING_LIBS) $(LAPACK_LIBS)
 # Of the compiler: threads.
 THREAD_LIBS := -lgomp
 # Programs: HDF5 from its archives where .ci/setup has found them, unless the caller names another. BLAS
 # first: most of what is looked up at a start is its own kernels. And last, for archives that call it.
 APP_LIBS = $(LAPACK_LIBS) $(if $(filter file,$(origin HDF5_LIBS)),$(HDF5_APP_LIBS),$(HDF5_LIBS)) \
-	$(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS) $(THREAD_LIBS)
+	$(UMFPACK_LIBS) $(MUMPS_LIBS) $(ORDERING_LIBS) $(LAPACK_LIBS) $(THREAD_LIBS)
 
 # Flags of a release by the build tags of sources, `! build: lanes`: module_order.py reads them.
 
@@ -187,36 +188,43 @@ TAGS := $(sort $(patsubst FFLAGS_OF_%,%,$(filter FFLAGS_OF_%,$(.VARIABLES))))
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 # Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.
 ifdef COMPILER
-$(shell mkdir -p $(O) $(BUILD)/mod)
+$(shell mkdir -p $(O) $(COMMON)/mod $(BUILD)/obj)
 define stored
 ifneq ($$(shell cat $(1) 2> /dev/null),$$(strip $$($(2))))
 $$(file >$(1),$$(strip $$($(2))))
 endif
 endef
-FLAGS := $(COMPILER) $(FCOMPILE) $(VECTOR) $(CCOMPILE) $(LIBS)
+FLAGS := $(COMPILER) $(FCOMPILE) $(VECTOR) $(CCOMPILE)
 READ := $(SRC) $(INC)
-$(eval $(call stored,$(BUILD)/flags.txt,FLAGS))
-$(eval $(call stored,$(BUILD)/sources.txt,READ))
+$(eval $(call stored,$(COMMON)/flags.txt,FLAGS))
+$(eval $(call stored,$(COMMON)/sources.txt,READ))
 $(eval $(call stored,$(BUILD)/libs.txt,APP_LIBS))
-$(foreach tag,$(TAGS),$(eval $(call stored,$(BUILD)/flags_$(tag).txt,FFLAGS_OF_$(tag))))
+$(foreach tag,$(TAGS),$(eval $(call stored,$(COMMON)/flags_$(tag).txt,FFLAGS_OF_$(tag))))
 
-$(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt Makefile
-	@$(PYTHON) $< $(O) $(BUILD)/mod '$(TAGS)' $(SRC) > $@.$$$$ && mv $@.$$$$ $@
-include $(BUILD)/order.mk
+$(COMMON)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(COMMON)/sources.txt Makefile
+	@$(PYTHON) $< $(O) $(COMMON)/mod '$(TAGS)' $(SRC) > $@.$$$$ && mv $@.$$$$ $@
+include $(COMMON)/order.mk
 -include $(wildcard $(O)/*.d)
 endif
 
 # ---- library, program, kernel tests -------------------------------------------------------------
 
-$(O)/%.o: %.f90 $(BUILD)/flags.txt
+$(O)/%.o: %.f90 $(COMMON)/flags.txt
 	@echo "  FC    $<"
-	$(Q)$(FCOMPILE) -J$(BUILD)/mod -c $< -o $@
+	$(Q)$(FCOMPILE) -J$(COMMON)/mod -c $< -o $@
 
-$(O)/%.o: %.F90 $(BUILD)/flags.txt
+$(O)/%.o: %.F90 $(COMMON)/flags.txt
 	@echo "  FC    $<"
-	$(Q)$(FCOMPILE) -J$(BUILD)/mod -c $< -o $@
+	$(Q)$(FCOMPILE) -J$(COMMON)/mod -c $< -o $@
 
-$(O)/%.c.o: %.c $(BUILD)/flags.txt
+# Behind the one of the other licence: by then there are the modules that it uses.
+ifdef KNOWING
+$(BUILD)/obj/%.o: %.F90 $(O)/%.o
+	@echo "  FC    $<"
+	$(Q)$(FCOMPILE) -DEMCON_PERMISSIVE -I$(COMMON)/mod -J$(BUILD)/obj -c $< -o $@
+endif
+
+$(O)/%.c.o: %.c $(COMMON)/flags.txt
 	@echo "  CC    $<"
 	$(Q)$(CCOMPILE) -MMD -MP -c $< -o $@
 
@@ -231,7 +239,7 @@ $(BUILD)/libemcon.a: $(LIB_OBJ)
 # The library shows what the headers declare and the modules hold, and nothing else; that with the
 # sanitizers in it also what they call each other by.
 COMMA := ,
-SYMBOLS := $(BUILD)/made/symbols.map
+SYMBOLS := $(COMMON)/made/symbols.map
 ifneq ($(MADE),)
 SHOWN := $(if $(filter-out sanitize coverage,$(MODE)),-Wl$(COMMA)--version-script=$(SYMBOLS))
 endif
@@ -239,7 +247,7 @@ $(SYMBOLS): src_f90/make_symbols.py src_f90/c_header.py $(BORDER)/emcon.h
 	@mkdir -p $(@D)
 	$(Q)$(PYTHON) $< $(BORDER)/emcon.h > $@
 
-$(BUILD)/$(SHARED): $(LIB_OBJ) $(if $(MADE),$(SYMBOLS))
+$(BUILD)/$(SHARED): $(LIB_OBJ) $(if $(MADE),$(SYMBOLS)) $(BUILD)/libs.txt
 	@echo "  LINK  $@"
 	$(Q)$(FC) $(LDFLAGS_$(MODE)) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $(LIB_OBJ) \
 		$(SHOWN) $(LIBS) $(THREAD_LIBS)
@@ -252,7 +260,7 @@ $(BUILD)/emcon: $(APP_OBJ) $(BUILD)/libemcon.a $(BUILD)/libs.txt
 # `private`: what is made on the way keeps its own flags.
 $(TAGGED_threads:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
 define tagged
-$$(TAGGED_$(1):%=$(O)/%.o): $(BUILD)/flags_$(1).txt
+$$(TAGGED_$(1):%=$(O)/%.o): $(COMMON)/flags_$(1).txt
 $$(TAGGED_$(1):%=$(O)/%.o): private FFLAGS_release := $$(FFLAGS_OF_$(1))
 endef
 $(foreach tag,$(TAGS),$(eval $(call tagged,$(tag))))
@@ -279,7 +287,7 @@ app: $(BUILD)/emcon  ## the program, build/release/emcon
 BENCHES := $(patsubst tests/bench/%.f90,$(BUILD)/%,$(wildcard tests/bench/*.f90))
 $(BENCHES): $(BUILD)/%: tests/bench/%.f90 $(BUILD)/libemcon.a
 	@echo "  FC    $<"
-	$(Q)$(FCOMPILE) -I$(BUILD)/mod -o $@ $^ $(LIBS) $(THREAD_LIBS)
+	$(Q)$(FCOMPILE) -I$(COMMON)/mod -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
 benches: $(BENCHES)  ## the programs of tests/bench
 kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/kernels [SUITE [TEST]]
@@ -324,7 +332,7 @@ $(P)/_coremodule.c $(P)/fortranobject.c $(P)/include.txt &: $(P)/_core.pyf
 $(PYTHON_INCLUDE)/Python.h:
 	@echo "$(PY) cannot be extended: $@ is missing (python3-dev of Debian holds it)" >&2; exit 1
 
-$(P)/%.o: $(P)/%.c $(P)/include.txt $(PYTHON_INCLUDE)/Python.h $(BUILD)/flags.txt
+$(P)/%.o: $(P)/%.c $(P)/include.txt $(PYTHON_INCLUDE)/Python.h $(COMMON)/flags.txt
 	@echo "  CC    $<"
 	$(Q)$(CC) -O1 -g1 -fPIC -I$(PYTHON_INCLUDE) -I$(BORDER) @$(P)/include.txt $(CFLAGS) -c $< -o $@
 
@@ -453,7 +461,7 @@ install: app lib  ## program, library, headers, modules, man page, for CMake and
 	$(Q)install -m 755 $(BUILD)/$(SHARED) '$(TO)/lib'
 	$(Q)ln -sf $(SHARED) '$(TO)/lib/libemcon.so'
 	$(Q)install -m 644 $(BUILD)/libemcon.a '$(TO)/lib'
-	$(Q)install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(filter $(MODULES),$(basename $(notdir $(LIB_SRC))))) \
+	$(Q)install -m 644 $(patsubst %,$(COMMON)/mod/%.mod,$(filter $(MODULES),$(basename $(notdir $(LIB_SRC))))) \
 		$(BORDER)/emcon.h $(BORDER)/emcon.hpp '$(TO)/include/emcon'
 	$(Q)$(foreach file,$(filter %.pc,$(COMPANIONS)),$(call fill,$(file),'$(TO)/lib/pkgconfig') &&) :
 	$(Q)$(foreach file,$(filter %.cmake,$(COMPANIONS)),$(call fill,$(file),'$(TO)/lib/cmake/emcon') &&) :

@@ -7,14 +7,18 @@ system brings libraries of web and directory servers along. Its source is HDF5_S
 One OpenBLAS serves all that call BLAS and LAPACK: of the archive of the system
 (libopenblas-openmp-dev) what they call, for the processors of KERNELS.
 
-What a wheel holds of others is under their licences: their texts are put in, and the metadata name
-them. Everything stays in build/wheels, and is made once.
+Wheels are made with LICENSE=permissive: nothing in them is under the GPL without an exception for
+what uses it. What a wheel holds of others is under their licences: their texts are put in, the metadata
+name them, and a bill of materials (sboms/emcon.cdx.json) lists names, versions and hashes. A library
+whose licence is not in LICENSES is an error. Everything stays in build/wheels, and is made once.
 """
 
 from __future__ import annotations
 
 import argparse
 import glob
+import hashlib
+import json
 import os
 import re
 import shlex
@@ -30,10 +34,8 @@ WORK = ROOT/"build"/"wheels"
 VERSIONS = range(11, 15)
 #: Licences by what the name of a library begins with. The texts are those of the system.
 LICENSES = {
-    "libumfpack": "GPL-2.0-or-later", "libcholmod": "LGPL-2.1-or-later AND GPL-2.0-or-later",
-    "libamd": "BSD-3-Clause", "libcamd": "BSD-3-Clause", "libcolamd": "BSD-3-Clause",
-    "libccolamd": "BSD-3-Clause", "libsuitesparseconfig": "BSD-3-Clause",
-    "libmetis": "Apache-2.0", "libdmumps": "CECILL-C", "libmumps": "CECILL-C",
+    "libamd": "BSD-3-Clause", "libsuitesparseconfig": "BSD-3-Clause",
+    "libmetis": "Apache-2.0 AND LGPL-2.1-or-later", "libdmumps": "CECILL-C", "libmumps": "CECILL-C",
     "libpord": "CECILL-C", "libmpiseq": "CECILL-C", "libscotch": "CECILL-C",
     "libesmumps": "CECILL-C", "libopenblas": "BSD-3-Clause", "libblas": "BSD-3-Clause",
     "liblapack": "BSD-3-Clause", "libgfortran": "GPL-3.0-or-later WITH GCC-exception-3.1",
@@ -219,14 +221,17 @@ def repair(python: Path, wheel: Path, output: Path) -> Path:
     run(python, "-m", "wheel", "unpack", "--dest", repaired, file)
     (folder,) = (path for path in repaired.iterdir() if path.is_dir())
     (info,) = folder.glob("*.dist-info")
+    held = {re.sub(r"-[0-9a-f]{8}(?=[.-])", "", path.name): path for path in folder.glob("emcon.libs/*")}
     expressions = {"BSD-3-Clause"}
-    held = [re.sub(r"-[0-9a-f]{8}(?=[.-])", "", path.name) for path in folder.glob("emcon.libs/*")]
+    components = []
     for name in sorted({*held, "libhdf5"}):
         known = max((key for key in LICENSES if name.startswith(key)), key=len, default=None)
         if not known:
             sys.exit(f"error: the licence of {name} is not known to {Path(__file__).name}")
         expressions |= set(LICENSES[known].split(" AND "))
-        add_license(info/"licenses", known, name, originals)
+        package = add_license(info/"licenses", known, name, originals)
+        components.append(component(name, LICENSES[known], package, held.get(name)))
+    write_bill(info/"sboms"/"emcon.cdx.json", folder.name.split("-")[1], components)
     metadata = info/"METADATA"
     lines = metadata.read_text().split("\n")
     place = next(i for i, line in enumerate(lines) if line.startswith("License-Expression:"))
@@ -238,11 +243,11 @@ def repair(python: Path, wheel: Path, output: Path) -> Path:
     return output/file.name
 
 
-def add_license(folder: Path, known: str, name: str, originals: dict[str, str]) -> None:
-    """The licence of a library by the text that the system has of it."""
-    if known == "libhdf5":
-        text = WORK/"hdf5"/"COPYING"
-    else:
+def add_license(folder: Path, known: str, name: str, originals: dict[str, str]) -> str:
+    """The licence of a library by the text that the system has of it; the package that has it."""
+    owner = "libhdf5-dev"
+    text = WORK/"hdf5"/"COPYING"
+    if known != "libhdf5":
         path = next((place for library, place in originals.items()
                      if library.startswith(name.split(".so")[0]) or library.startswith(known)), "")
         # By its name alone: /lib and /usr/lib are one folder, and packages name either.
@@ -251,6 +256,23 @@ def add_license(folder: Path, known: str, name: str, originals: dict[str, str]) 
     if not text.is_file():
         sys.exit(f"error: there is no text of the licence of {name}")
     shutil.copy(text, folder/f"{known}.txt")
+    return owner
+
+
+def component(name: str, terms: str, package: str, file: Path | None) -> dict[str, object]:
+    """A library in the bill of materials; one that is a part of another file has no hash."""
+    version = run("dpkg-query", "--show", "--showformat", "${source:Version}", package)
+    hashes = [{"alg": "SHA-256", "content": hashlib.sha256(file.read_bytes()).hexdigest()}] if file else []
+    return {"type": "library", "name": name, "version": version, "licenses": [{"expression": terms}],
+            "hashes": hashes, "properties": [{"name": "package", "value": package}]}
+
+
+def write_bill(path: Path, version: str, components: list[dict[str, object]]) -> None:
+    """What a wheel holds of others, as CycloneDX."""
+    path.parent.mkdir(exist_ok=True)
+    own = {"type": "library", "name": "emcon", "version": version, "licenses": [{"expression": "BSD-3-Clause"}]}
+    path.write_text(json.dumps({"bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1,
+                                "metadata": {"component": own}, "components": components}, indent=1) + "\n")
 
 
 def main() -> None:
@@ -264,7 +286,7 @@ def main() -> None:
     python = tools()
     tree = source_tree(python, output)
     # VECTOR=: for every machine of the architecture.
-    env = os.environ | lean_hdf5() | {"VECTOR": ""}
+    env = os.environ | lean_hdf5() | {"VECTOR": "", "LICENSE": "permissive"}
     for interpreter in options.python or pythons():
         say(f"wheel for {interpreter}")
         built = WORK/"built"

@@ -60,6 +60,7 @@ def make(objects: Path, package: Path) -> None:
            if name not in {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}}
     env.setdefault("PYTHON", sys.executable)
     env["EMCON_SETUP_INSTALLS"] = "no"  # pip changes an environment of Python, never the system
+    env.setdefault("LICENSE", "permissive")  # what pip installs may be passed on with any program
     variables = {
         "PY": python,
         "PY_READY": "",

@@ -144,6 +144,16 @@ def test_the_kernel_tests_are_compiled_once(tree):
     assert not tree.make("kernels")
 
 
+def test_the_other_licence_compiles_what_knows_of_it(tree):
+    tree.write("algebra/emcon_solver_kinds.F90", LOW.replace("emcon_low", "emcon_solver_kinds"))
+    assert "emcon_solver_kinds" in tree.make("lib", "kernels")
+    found = tree.make("LICENSE=permissive", "lib", "kernels")
+    assert set(found) == {"emcon_solver_kinds", "main"}
+    assert all(" -DEMCON_PERMISSIVE " in line for line in found.values())
+    assert " -O0 " in found["main"] and " -O0 " not in found["emcon_solver_kinds"]
+    assert not tree.make("LICENSE=permissive", "lib", "kernels") and not tree.make("lib", "kernels")
+
+
 LAWS = """module emcon_laws
    implicit none
    private

@@ -1,4 +1,4 @@
-!> The library below UMFPACK, CHOLMOD and LAPACK: its threads, and its floating-point exceptions.
+!> The library below UMFPACK, MUMPS and LAPACK: its threads, and its floating-point exceptions.
 module emcon_blas
    use, intrinsic :: ieee_exceptions, only : ieee_all, ieee_get_status, ieee_set_halting_mode, &
       ieee_set_status, ieee_status_type

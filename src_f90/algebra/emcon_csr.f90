@@ -1,7 +1,7 @@
 !> Sparse matrices by rows (CSR), their patterns, and their products with vectors.
 !>
-!> The index values are 0-based, as UMFPACK and CHOLMOD read them; the arrays themselves start
-!> at 1. Row i holds the slots k = row_start(i) + 1, ..., row_start(i + 1), slot k stands in
+!> The index values are 0-based, as UMFPACK reads them; the arrays themselves start at 1. Row i
+!> holds the slots k = row_start(i) + 1, ..., row_start(i + 1), slot k stands in
 !> column `column(k) + 1`. Columns ascend in each row and none occurs twice.
 module emcon_csr
    use emcon_errors, only : err_analysis, err_internal, error_t, raise
@@ -11,7 +11,8 @@ module emcon_csr
    implicit none
    private
    public :: csr_t, csr_from_elements, csr_from_entries, csr_from_values, csr_sort_columns
-   public :: csr_list_users, csr_find, csr_is_same, csr_copy_pattern, csr_copy_filled
+   public :: csr_list_users, csr_find, csr_is_same, csr_is_symmetric, csr_copy_pattern
+   public :: csr_copy_filled
    public :: csr_multiply, csr_multiply_transposed, csr_pick_rows, csr_transpose
 
    type :: csr_t
@@ -332,6 +333,25 @@ contains
       if (csr_is_same) csr_is_same = all(a%row_start == b%row_start)
       if (csr_is_same) csr_is_same = all(a%column == b%column)
    end function csr_is_same
+
+   !> Has each entry of a square pattern one across the diagonal, which has no gaps?
+   pure logical function csr_is_symmetric(self)
+      type(csr_t), intent(in) :: self
+      integer :: i, j, k, next(self%n_row)
+
+      csr_is_symmetric = .false.
+      do i = 1, self%n_row
+         next(i) = csr_find(self, i, i) + 1
+         if (next(i) == 1) return
+         do k = self%row_start(i) + 1, next(i) - 2
+            j = self%column(k) + 1
+            if (next(j) > self%row_start(j + 1)) return
+            if (self%column(next(j)) + 1 /= i) return
+            next(j) = next(j) + 1
+         end do
+      end do
+      csr_is_symmetric = all(next == self%row_start(2:) + 1)
+   end function csr_is_symmetric
 
    !> y = A x
    pure subroutine csr_multiply(self, x, y)

@@ -5,7 +5,7 @@
 !> order of the unknowns in L is block by block, so that the bits do not depend on who works on
 !> which of them.
 module emcon_diagonal_blocks
-   use emcon_csr, only : csr_find, csr_t
+   use emcon_csr, only : csr_find, csr_is_symmetric, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp
    use emcon_power_scaling, only : power_of_two
@@ -71,7 +71,7 @@ contains
       self%is_symmetric = .true.
       do b = 1, self%n_block
          call extract(self, self%block(b), matrix)
-         self%is_symmetric = self%is_symmetric .and. has_symmetric_pattern(self%block(b))
+         self%is_symmetric = self%is_symmetric .and. csr_is_symmetric(self%block(b)%matrix)
          if (.not. self%is_symmetric) return
          allocate(self%block(b)%solver, source=self%kind)
          self%block(b)%solver%needs_halves = .true.
@@ -228,27 +228,6 @@ contains
       allocate(block%upper(n), source=0)
       if (.not. block%is_range) allocate(block%b(n), block%image(n), source=0.0_dp)
    end subroutine extract
-
-   !> Has each entry of the block one across the diagonal, which has no gaps?
-   pure logical function has_symmetric_pattern(block)
-      type(block_t), intent(in) :: block
-      integer :: i, j, k, next(size(block%unknown))
-
-      associate (rows => block%matrix)
-         has_symmetric_pattern = .false.
-         do i = 1, rows%n_row
-            next(i) = csr_find(rows, i, i) + 1
-            if (next(i) == 1) return
-            do k = rows%row_start(i) + 1, next(i) - 2
-               j = rows%column(k) + 1
-               if (next(j) > rows%row_start(j + 1)) return
-               if (rows%column(next(j)) + 1 /= i) return
-               next(j) = next(j) + 1
-            end do
-         end do
-         has_symmetric_pattern = all(next == rows%row_start(2:) + 1)
-      end associate
-   end function has_symmetric_pattern
 
    !> Factorise the symmetric part of the matrix whose pattern was analysed, and is symmetric.
    subroutine blocks_factorise(self, matrix, is_singular, error)

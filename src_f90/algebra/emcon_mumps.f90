@@ -8,12 +8,14 @@ module emcon_mumps
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_int, c_null_ptr, c_ptr
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
-   use emcon_csr, only : csr_copy_pattern, csr_is_same, csr_t
+   use emcon_csr, only : csr_copy_pattern, csr_is_same, csr_is_symmetric, csr_t
+   use emcon_elimination_tree, only : elimination_tree_t
    use emcon_errors, only : err_internal, error_t, raise
    use emcon_kinds, only : dp, int64, wp
+   use emcon_ordering, only : ordering_find
    use emcon_power_scaling, only : power_of_two, power_scaling_t
-   use emcon_sparse_solver, only : matrix_definite, matrix_general, solver_check_square, &
-      solver_check_values, solver_raise, sparse_solver_t
+   use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
+      solver_check_square, solver_check_values, solver_raise, sparse_solver_t
    implicit none
    private
    public :: mumps_t
@@ -42,11 +44,12 @@ module emcon_mumps
          integer(c_int), value :: symmetry
       end function emcon_mumps_new
 
-      integer(c_int) function emcon_mumps_analyse(handle, n, n_entry, row, column) bind(c)
+      integer(c_int) function emcon_mumps_analyse(handle, n, n_entry, row, column, &
+         n_place, place) bind(c)
          import :: c_int, c_ptr
          type(c_ptr), value :: handle
-         integer(c_int), value :: n, n_entry
-         integer(c_int), intent(in) :: row(*), column(*)
+         integer(c_int), value :: n, n_entry, n_place
+         integer(c_int), intent(in) :: row(*), column(*), place(*)
       end function emcon_mumps_analyse
 
       integer(c_int) function emcon_mumps_factorise(handle, value, n_factor, n_negative) bind(c)
@@ -77,6 +80,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer(c_int) :: status
       integer, allocatable :: row(:)
+      integer(c_int), allocatable :: place(:)
       integer :: i, k
 
       if (c_associated(self%handle)) then
@@ -94,15 +98,13 @@ contains
       allocate(self%entry, source=pack([(k, k = 1, size(row))], &
          self%symmetry == matrix_general .or. matrix%column + 1 <= row))
       allocate(self%value(size(self%entry)), self%x(matrix%n_row))
+      call find_place(self, place)
       self%handle = emcon_mumps_new(int(self%symmetry, c_int))
       status = mumps_no_memory(1)
       if (c_associated(self%handle)) then
-         ! Orderings may draw from the generator of the process.
-         !$omp critical (emcon_ordering)
          status = emcon_mumps_analyse(self%handle, int(matrix%n_row, c_int), &
             int(size(self%entry), c_int), int(row(self%entry), c_int), &
-            int(matrix%column(self%entry) + 1, c_int))
-         !$omp end critical (emcon_ordering)
+            int(matrix%column(self%entry) + 1, c_int), size(place), place)
       end if
       self%n_analysis = self%n_analysis + 1
       ! A pattern without a full transversal is found out by its values.
@@ -110,6 +112,28 @@ contains
          "MUMPS", "ordering", int(status), any(status == mumps_no_memory), self%scaled)
       if (allocated(error)) call self%free()
    end subroutine mumps_analyse
+
+   !> When each unknown is eliminated, from 1; none where MUMPS has to find an order itself: where
+   !> the pattern is not symmetric, and for saddle points, whose pivots by value it foresees.
+   subroutine find_place(self, place)
+      type(mumps_t), intent(in) :: self          !! with the pattern
+      integer(c_int), allocatable, intent(out) :: place(:)
+      type(elimination_tree_t) :: tree
+      logical :: is_found
+      integer :: k
+
+      is_found = self%symmetry /= matrix_symmetric
+      if (is_found) is_found = csr_is_symmetric(self%scaled)
+      if (is_found) call ordering_find(self%scaled, self%seeks_less_fill, tree, is_found)
+      if (.not. is_found) then
+         allocate(place(0))
+         return
+      end if
+      allocate(place(self%scaled%n_row))
+      do k = 1, size(place)
+         place(tree%order(k)) = k
+      end do
+   end subroutine find_place
 
    subroutine mumps_factorise(self, value, error)
       class(mumps_t), intent(inout) :: self

@@ -2,6 +2,7 @@
    bind to it directly. MUMPS keeps module variables while it works: one thread at a time. */
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 #include <dmumps_c.h>
 
 #define JOB_INIT -1
@@ -16,7 +17,7 @@ enum { too_little_room = -9, too_little_integer_room = -8 };
 
 typedef struct {
    DMUMPS_STRUC_C id;
-   int *irn, *jcn;
+   int *irn, *jcn, *place;
 } emcon_mumps_t;
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
@@ -45,7 +46,7 @@ void *emcon_mumps_new(int symmetry)
    h->id.ICNTL(1) = h->id.ICNTL(2) = h->id.ICNTL(3) = -1;   /* a library does not write */
    h->id.ICNTL(4) = 0;
    h->id.ICNTL(6) = 0;    /* no permutation by values: a pattern is analysed once */
-   h->id.ICNTL(7) = 0;    /* AMD: the same for every call */
+   h->id.ICNTL(7) = 0;    /* AMD, unless an order is given: the same for every call */
    h->id.ICNTL(8) = 0;    /* values are scaled before, by powers of two */
    h->id.ICNTL(10) = 0;   /* no refinement */
    h->id.ICNTL(12) = 1;
@@ -54,22 +55,29 @@ void *emcon_mumps_new(int symmetry)
    return h;
 }
 
-/* Rows and columns from 1, `n_entry` of them; only one triangle if the matrix is symmetric. */
-int emcon_mumps_analyse(void *handle, int n, int n_entry, const int *row, const int *column)
+static int *copy(const int *from, int n)
+{
+   int *to = malloc((size_t)(n + 1)*sizeof *to);   /* some room for none, too */
+   if (to != NULL) memcpy(to, from, (size_t)n*sizeof *to);
+   return to;
+}
+
+/* Rows and columns from 1, `n_entry` of them; only one triangle if the matrix is symmetric. `place`:
+   when each unknown is eliminated, from 1; without these MUMPS finds an order. */
+int emcon_mumps_analyse(void *handle, int n, int n_entry, const int *row, const int *column,
+                        int n_place, const int *place)
 {
    emcon_mumps_t *h = handle;
-   int k;
-   h->irn = malloc((size_t)n_entry*sizeof *h->irn);
-   h->jcn = malloc((size_t)n_entry*sizeof *h->jcn);
-   if (h->irn == NULL || h->jcn == NULL) return -13;
-   for (k = 0; k < n_entry; k++) {
-      h->irn[k] = row[k];
-      h->jcn[k] = column[k];
-   }
+   h->irn = copy(row, n_entry);
+   h->jcn = copy(column, n_entry);
+   h->place = copy(place, n_place);
+   if (h->irn == NULL || h->jcn == NULL || h->place == NULL) return -13;
    h->id.n = n;
    h->id.nnz = n_entry;
    h->id.irn = h->irn;
    h->id.jcn = h->jcn;
+   h->id.perm_in = h->place;
+   if (n_place > 0) h->id.ICNTL(7) = 1;
    return call(h, analysis);
 }
 
@@ -107,5 +115,6 @@ void emcon_mumps_free(void *handle)
    call(h, JOB_END);
    free(h->irn);
    free(h->jcn);
+   free(h->place);
    free(h);
 }

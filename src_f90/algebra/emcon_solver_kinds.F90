@@ -1,33 +1,33 @@
 !> The kinds of solvers. A new one is one file, one row of `rows` and one case of
 !> `allocate_solver`.
 !>
-!> EMCON_PERMISSIVE: built without SuiteSparse, whose solvers are under the GPL.
+!> EMCON_PERMISSIVE: built without UMFPACK, which is under the GPL.
 submodule (emcon_solver_registry) emcon_solver_kinds
 #ifndef EMCON_PERMISSIVE
-   use emcon_cholmod, only : cholmod_t
    use emcon_umfpack, only : umfpack_t
 #endif
    use emcon_chosen_solver, only : chosen_solver_t
    use emcon_mumps, only : mumps_t
    use emcon_sparse_solver, only : matrix_definite, matrix_general, sparse_solver_t
+   use emcon_supernodal, only : supernodal_t
    implicit none
 
    !> Besides those of the registry.
    integer, parameter :: solver_umfpack = 1, solver_direct = 3, solver_iterative = 4
 
 #ifdef EMCON_PERMISSIVE
-   logical, parameter :: has_suitesparse = .false.
-   character(len=*), parameter :: default_text = "MUMPS or iterative", direct_text = "MUMPS"
+   logical, parameter :: has_umfpack = .false.
+   character(len=*), parameter :: general_text = "MUMPS"
 #else
-   logical, parameter :: has_suitesparse = .true.
-   character(len=*), parameter :: default_text = "CHOLMOD, UMFPACK or iterative", &
-      direct_text = "CHOLMOD, UMFPACK"
+   logical, parameter :: has_umfpack = .true.
+   character(len=*), parameter :: general_text = "UMFPACK"
 #endif
    type(solver_row_t), parameter :: rows(*) = [ &
-      solver_row_t("DEFAULT", solver_default, .true., default_text), &
-      solver_row_t("UMFPACK", solver_umfpack, has_suitesparse, "UMFPACK"), &
+      solver_row_t("DEFAULT", solver_default, .true., &
+         "Cholesky, " // general_text // " or iterative"), &
+      solver_row_t("UMFPACK", solver_umfpack, has_umfpack, "UMFPACK"), &
       solver_row_t("MUMPS", solver_mumps, .true., "MUMPS"), &
-      solver_row_t("DIRECT", solver_direct, .true., direct_text), &
+      solver_row_t("DIRECT", solver_direct, .true., "Cholesky, " // general_text), &
       solver_row_t("ITERATIVE", solver_iterative, .true., "conjugate gradients where they can be")]
 
 contains
@@ -42,7 +42,7 @@ contains
 
    module procedure factors_symmetric
       factors_symmetric = choice == solver_mumps .or. (choice /= solver_umfpack &
-         .and. choice <= solver_user .and. .not. has_suitesparse)
+         .and. choice <= solver_user .and. .not. has_umfpack)
    end procedure factors_symmetric
 
    module procedure allocate_solver
@@ -74,17 +74,18 @@ contains
       integer, intent(in) :: choice, symmetry
       class(sparse_solver_t), allocatable, intent(out) :: solver
 
-#ifdef EMCON_PERMISSIVE
-      allocate(mumps_t :: solver)
-#else
-      if (choice == solver_mumps) then
-         allocate(mumps_t :: solver)
-      else if (choice /= solver_umfpack .and. symmetry == matrix_definite) then
-         allocate(cholmod_t :: solver)
-      else
+      if (symmetry == matrix_definite .and. choice /= solver_mumps &
+         .and. choice /= solver_umfpack) then
+         allocate(supernodal_t :: solver)
+         return
+      end if
+#ifndef EMCON_PERMISSIVE
+      if (choice /= solver_mumps) then
          allocate(umfpack_t :: solver)
+         return
       end if
 #endif
+      allocate(mumps_t :: solver)
    end subroutine allocate_direct
 
 end submodule emcon_solver_kinds

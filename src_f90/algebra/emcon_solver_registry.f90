@@ -7,8 +7,8 @@ module emcon_solver_registry
    public :: solver_row_t, solver_row, n_solver_row, find_solver_row, solver_names, solver_create
    public :: is_foreign_solver, factors_symmetric, solver_default, solver_mumps, solver_user
 
-   !> The default: CHOLMOD or iterations for definite matrices, UMFPACK for others; MUMPS for
-   !> CHOLMOD and UMFPACK where these are not.
+   !> The default: factors by dense blocks or iterations for definite matrices, UMFPACK for others,
+   !> or MUMPS where that is not built in.
    !> Codes above `solver_user` are those that a program gives, in their order.
    integer, parameter :: solver_default = 0, solver_mumps = 2, solver_user = 100
 

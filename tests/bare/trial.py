@@ -34,7 +34,7 @@ SCENES = ("bumper", "oring", "press_fit")
 SHOWN = ["libglu1-mesa", "libgl1", "libxrender1", "libxcursor1", "libxft2", "libxinerama1",
          "libxfixes3", "libgomp1", "libegl1"]
 #: Of an installed prefix, by the names of Debian 12.
-LIBRARIES = ["libhdf5-103-1", "libhdf5-fortran-102", "libumfpack5", "libcholmod3",
+LIBRARIES = ["libhdf5-103-1", "libhdf5-fortran-102", "libumfpack5", "libamd2", "libmetis5",
              "libmumps-seq-5.5", "libopenblas0", "libgfortran5", "libgomp1"]
 
 

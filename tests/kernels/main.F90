@@ -18,16 +18,14 @@ program main
    use test_chain, only : collect_chain
    use test_check, only : collect_check
    use test_circles, only : collect_circles
-#ifndef EMCON_PERMISSIVE
    use test_iterative, only : collect_iterative
    use test_diagonal_blocks, only : collect_diagonal_blocks
    use test_edge_pair, only : collect_edge_pair
    use test_kept_factor, only : collect_kept_factor
-   use test_cholmod, only : collect_cholmod
+   use test_elimination_tree, only : collect_elimination_tree
    use test_contact_slips_space, only : collect_contact_slips_space
    use test_slips_space, only : collect_slips_space
    use test_supernodal, only : collect_supernodal
-#endif
    use test_condensation, only : collect_condensation
    use test_condition_nodes, only : collect_condition_nodes
    use test_condition_rows, only : collect_condition_rows
@@ -262,13 +260,11 @@ program main
    call run("condition_reuse", collect_condition_reuse)
    call run("contact_states", collect_contact_states)
    call run("step_begin", collect_step_begin)
-#ifndef EMCON_PERMISSIVE
    call run("diagonal_blocks", collect_diagonal_blocks)
    call run("iterative", collect_iterative)
    call run("kept_factor", collect_kept_factor)
-   call run("cholmod", collect_cholmod)
+   call run("elimination_tree", collect_elimination_tree)
    call run("supernodal", collect_supernodal)
-#endif
    call run("host_contact", collect_host_contact)
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)

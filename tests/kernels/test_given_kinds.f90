@@ -15,7 +15,7 @@ module test_given_kinds
    use emcon_stepper_user, only : stepper_give_constraint, stepper_give_mass, &
       stepper_give_scheme, stepper_give_solver
    use emcon_text, only : to_text
-   use emcon_umfpack, only : umfpack_t
+   use emcon_mumps, only : mumps_t
    use given_scenes, only : lump, make_line
    use one_element, only : read_one
    implicit none
@@ -35,7 +35,7 @@ module test_given_kinds
    end type rod_t
 
    !> One that solves nothing.
-   type, extends(umfpack_t) :: idle_solver_t
+   type, extends(mumps_t) :: idle_solver_t
    contains
       procedure :: solve => idle_solve
    end type idle_solver_t
@@ -100,7 +100,7 @@ contains
    subroutine test_solver(error)
       type(error_t), allocatable, intent(out) :: error
       type(stepper_t) :: own, other
-      type(umfpack_t) :: solver
+      type(mumps_t) :: solver
       type(idle_solver_t) :: idle
 
       call read_flight(own, "ENERGY MOMENTUM", error)
@@ -224,7 +224,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: refused
       type(stepper_t) :: unsolved, unnamed
-      type(umfpack_t) :: solver
+      type(mumps_t) :: solver
 
       call read_flight(unsolved, "ENERGY MOMENTUM", error)
       if (allocated(error)) return

@@ -1,10 +1,11 @@
-!> Rough factors by dense blocks: what they solve, sparse right-hand sides, units, and matrices that
-!> ask for more digits.
+!> Factors by dense blocks, rough ones and those of double precision: what they solve, sparse
+!> right-hand sides, units, matrices that ask for more digits, and those that have no factor.
 module test_supernodal
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only : real32
    use check, only : check_near, check_true, test_case_t
-   use emcon_cholmod, only : cholmod_t
-   use emcon_csr, only : csr_find, csr_from_values, csr_multiply, csr_pick_rows, csr_t
+   use emcon_csr, only : csr_find, csr_from_elements, csr_from_values, csr_multiply, &
+       csr_pick_rows, csr_t
    use emcon_errors, only : error_t
    use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
       blocks_has_panels, blocks_reach, blocks_reach_rows, diagonal_blocks_t
@@ -13,6 +14,7 @@ module test_supernodal
    use emcon_row_pool, only : row_pool_add, row_pool_append, row_pool_fill_products, &
       row_pool_find, row_pool_forget, row_pool_subtract_products, row_pool_t
    use emcon_sparse_solver, only : matrix_definite
+   use emcon_supernodal, only : supernodal_t
    use sparse_samples, only : quad_mesh_matrix
    implicit none
    private
@@ -22,6 +24,8 @@ module test_supernodal
    integer, parameter :: n_x = 60, n_y = 60, n = 2*(n_x + 1)*(n_y + 1)
    !> Round-off of a factorisation, for matrices whose condition is below 1e4.
    real(wp), parameter :: tol = 1.0e4_wp*max(real(epsilon(1.0_dp), wp), epsilon(1.0_wp))
+   !> Of the mass of a bar of five elements.
+   real(wp), parameter :: row_sums(6) = [0.5_wp, 1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 0.5_wp]
    real(wp), parameter :: rough_tol = 1.0e4_wp*epsilon(1.0_real32)
 
 contains
@@ -39,13 +43,17 @@ contains
          test_case_t("one dense block of any width", test_dense), &
          test_case_t("a large condition asks for all digits", test_condition), &
          test_case_t("so do numbers out of range", test_range), &
-         test_case_t("not positive definite", test_indefinite)]
+         test_case_t("not positive definite", test_indefinite), &
+         test_case_t("mass of a bar", test_bar), &
+         test_case_t("solutions to round-off", test_full), &
+         test_case_t("no factor, then one", test_no_factor), &
+         test_case_t("an entry has none across the diagonal", test_one_sided)]
    end subroutine collect_supernodal
 
    subroutine test_solve(error)
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
 
       call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
       if (.not. allocated(error)) call prepare(solver, a, error)
@@ -58,7 +66,7 @@ contains
    subroutine test_reach(error)
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
 
       call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
       if (.not. allocated(error)) call prepare(solver, a, error)
@@ -68,13 +76,13 @@ contains
       call prepare(solver, a, error)
       if (allocated(error)) return
       call check_true(error, .not. solver%is_rough, "the factors are not rough")
-      if (.not. allocated(error)) call check_reach(solver, tol, error)
+      if (.not. allocated(error)) call check_reach(solver, 0.0_wp, error)
       call solver%free()
    end subroutine test_reach
 
    !> The first half by what a sparse right-hand side reaches is that by all.
    subroutine check_reach(solver, allowed, error)
-      type(cholmod_t), intent(inout) :: solver
+      type(supernodal_t), intent(inout) :: solver
       real(wp), intent(in) :: allowed            !! of one
       type(error_t), allocatable, intent(inout) :: error
       integer, parameter :: column(3) = [17, n/2, n/2 + 3]
@@ -136,7 +144,7 @@ contains
       integer :: i, k, m, column(3*n_row), row(3*n_row)
       logical :: is_new, is_singular
 
-      allocate(cholmod_t :: blocks%kind)
+      allocate(supernodal_t :: blocks%kind)
       blocks%kind%symmetry = matrix_definite
       blocks%may_be_rough = .true.
       call blocks_analyse(blocks, a, is_new, error)
@@ -251,7 +259,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: powers(4) = [-600, -60, 37, 600]
       type(csr_t) :: a, scaled
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
       real(dp) :: b(n), x(n), y(n)
       integer :: i_power
 
@@ -276,7 +284,7 @@ contains
    subroutine test_small(error)
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
 
       call quad_mesh_matrix(10, 9, 0.0_dp, a, error)
       if (.not. allocated(error)) call prepare(solver, a, error)
@@ -291,7 +299,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: width(4) = [128, 135, 143, 300]
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
       integer :: i, j, k
 
       do k = 1, size(width)
@@ -313,7 +321,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(dp), parameter :: rest = 1.0e-9_dp
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
 
       call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
       if (allocated(error)) return
@@ -335,7 +343,7 @@ contains
    subroutine test_range(error)
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
       integer :: slot
 
       call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
@@ -352,7 +360,7 @@ contains
    subroutine test_indefinite(error)
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: a
-      type(cholmod_t) :: solver
+      type(supernodal_t) :: solver
 
       call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
       if (allocated(error)) return
@@ -369,6 +377,111 @@ contains
       call solver%free()
    end subroutine test_indefinite
 
+   !> Linear elements of mass (2 1; 1 2)/6: the rows of M sum to 1, at the ends to 1/2.
+   subroutine test_bar(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(supernodal_t) :: solver
+      real(wp) :: x(6)
+
+      call sample_bar(a, error)
+      if (.not. allocated(error)) call solver%analyse(a, error)
+      if (allocated(error)) return
+      call check_true(error, solver%n_factor == 11, "entries of the factor")
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+      if (.not. allocated(error)) call solver%solve(row_sums, x, error)
+      if (allocated(error)) return
+      call check_near(error, x, spread(1.0_wp, 1, 6), tol, 1.0_wp, "x")
+      call solver%free()
+   end subroutine test_bar
+
+   !> Without halves alone, whatever the columns are.
+   subroutine test_full(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(supernodal_t) :: solver
+      real(wp) :: b(n), x(n), y(n)
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (allocated(error)) return
+      call random_number(b)
+      call solver%analyse(a, error)
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+      if (.not. allocated(error)) call solver%solve(b, x, error)
+      if (allocated(error)) return
+      call csr_multiply(a, x, y)
+      call check_near(error, y, b, tol, 1.0_wp, "A x")
+      call solver%free()
+   end subroutine test_full
+
+   !> Indefinite, zero, negative in the first and in the last row, not a number; then regular again.
+   subroutine test_no_factor(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(supernodal_t) :: solver
+      real(dp), allocatable :: good(:)
+      real(wp) :: x(6)
+      integer :: i_case
+
+      call sample_bar(a, error)
+      if (.not. allocated(error)) call solver%analyse(a, error)
+      if (allocated(error)) return
+      good = a%value
+      do i_case = 1, 5
+         a%value = good
+         select case (i_case)
+         case (1)
+            a%value(2:3) = 10.0_dp
+         case (2)
+            a%value = 0.0_dp
+         case (3)
+            a%value(1) = -1.0_dp
+         case (4)
+            a%value(size(good)) = -1.0_dp
+         case default
+            a%value(4) = ieee_value(1.0_dp, ieee_quiet_nan)
+         end select
+         call solver%factorise(a%value, error)
+         if (allocated(error)) return
+         call check_true(error, solver%is_singular, "found not positive definite")
+         if (allocated(error)) return
+      end do
+      call solver%factorise(good, error)
+      if (.not. allocated(error)) call solver%solve(row_sums, x, error)
+      if (allocated(error)) return
+      call check_near(error, x, spread(1.0_wp, 1, 6), tol, 1.0_wp, "x")
+      call solver%free()
+   end subroutine test_no_factor
+
+   subroutine test_one_sided(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(supernodal_t) :: solver
+
+      call csr_from_values(a, 2, 2, [1, 1, 2], [1, 2, 2], spread(1.0_wp, 1, 3))
+      call solver%analyse(a, error)
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+      if (allocated(error)) return
+      call check_true(error, solver%is_singular, "no matrix of that pattern is symmetric")
+      call solver%free()
+   end subroutine test_one_sided
+
+   !> Consistent mass of five bar elements.
+   subroutine sample_bar(a, error)
+      type(csr_t), intent(out) :: a
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: slot(:)
+      integer :: k
+      real(dp) :: entry
+
+      call csr_from_elements(a, 6, [1, 3, 5, 7, 9, 11], [1, 2, 2, 3, 3, 4, 4, 5, 5, 6], slot, error)
+      if (allocated(error)) return
+      do k = 1, size(slot)
+         entry = merge(2.0_dp, 1.0_dp, mod(k, 4) <= 1)/6.0_dp
+         a%value(slot(k)) = a%value(slot(k)) + entry
+      end do
+   end subroutine sample_bar
+
    !> -1 off the diagonal; rows sum to `rest` times their number of entries.
    pure subroutine fill(a, rest)
       type(csr_t), intent(inout) :: a
@@ -383,7 +496,7 @@ contains
 
    !> A x = b, for random b.
    subroutine check_solution(solver, a, allowed, error)
-      type(cholmod_t), intent(inout) :: solver
+      type(supernodal_t), intent(inout) :: solver
       type(csr_t), intent(in) :: a
       real(wp), intent(in) :: allowed            !! of the largest x
       type(error_t), allocatable, intent(inout) :: error
@@ -400,7 +513,7 @@ contains
    end subroutine check_solution
 
    subroutine prepare(solver, a, error)
-      type(cholmod_t), intent(inout) :: solver
+      type(supernodal_t), intent(inout) :: solver
       type(csr_t), intent(in) :: a
       type(error_t), allocatable, intent(out) :: error
 
@@ -413,7 +526,7 @@ contains
 
    !> By both halves.
    subroutine solve(solver, b, x, error)
-      type(cholmod_t), intent(inout) :: solver
+      type(supernodal_t), intent(inout) :: solver
       real(dp), intent(in), contiguous :: b(:)
       real(dp), intent(inout), contiguous :: x(:)
       type(error_t), allocatable, intent(out) :: error
