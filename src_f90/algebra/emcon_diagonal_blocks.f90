@@ -541,6 +541,7 @@ contains
       end if
       if (allocated(self%of)) deallocate(self%of, self%place)
       self%n_block = 0
+      self%is_incomplete = .false.
    end subroutine blocks_free
 
 end module emcon_diagonal_blocks
