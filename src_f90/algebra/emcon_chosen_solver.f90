@@ -2,14 +2,16 @@
 !>
 !> Iterations come into question where solutions need not be exact (`accuracy`). The order in which
 !> a matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
-!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix
-!> turns out not to be definite, it is factorised after all, until the next values.
+!> chooses alike whenever it is repeated. Where the unknowns of nodes are blocks, as in space, the
+!> nodes are ordered for that: a ninth of the entries. Where iterations do not come to an end, or
+!> the matrix turns out not to be definite, it is factorised after all, until the next values.
 !> Source: docs/theory.md, section 8.
 module emcon_chosen_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t, iterative_work
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_node_blocks, only : n_side, node_blocks_quotient
    use emcon_row_panels, only : row_panel_t
    use emcon_sparse_solver, only : sparse_solver_t
    implicit none
@@ -40,6 +42,8 @@ module emcon_chosen_solver
       class(sparse_solver_t), allocatable :: general     !! of those that turn out otherwise
       type(iterative_solver_t) :: iterative
       integer, private :: by = by_factors
+      !> Of the pattern that was last found to be for factors; 0: there is none
+      integer, private :: n_row = 0, n_slot = 0
    contains
       procedure :: analyse => chosen_analyse
       procedure :: factorise => chosen_factorise
@@ -69,8 +73,10 @@ contains
       end if
       before = self%direct%n_analysis
       call prepare_direct(self)
-      call self%direct%analyse(matrix, error)
-      if (allocated(error) .or. self%direct%n_analysis == before) return
+      if (self%n_row == matrix%n_row .and. self%n_slot == size(matrix%column)) then
+         call self%direct%analyse(matrix, error)
+         if (allocated(error) .or. self%direct%n_analysis == before) return
+      end if
       self%n_analysis = self%n_analysis + 1
       call choose(self, matrix, error)
       self%is_incomplete = self%iterates
@@ -92,29 +98,68 @@ contains
    !> Iterations or factors? First by the entries of the matrix, then by those of its blocks, which
    !> are filled up where nodes have fewer than three unknowns.
    subroutine choose(self, matrix, error)
-      class(chosen_solver_t), intent(inout) :: self      !! `direct` has analysed the pattern
+      class(chosen_solver_t), intent(inout) :: self
       type(csr_t), intent(in) :: matrix
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: step
+      logical :: is_predicted
 
-      self%n_factor = self%direct%n_factor
-      self%n_operation = self%direct%n_operation
+      self%n_row = 0
+      is_predicted = .false.
+      if (self%accuracy > 0.0_dp) call predict_by_nodes(self, matrix, is_predicted, error)
+      if (.not. (is_predicted .or. allocated(error))) call analyse_direct(self, matrix, error)
+      if (allocated(error)) return
       step = 4.0_dp*size(matrix%column)
       self%iterates = self%accuracy > 0.0_dp .and. (self%prefers_iterations &
          .or. takes_less(self, matrix%n_row, step))
-      if (.not. self%iterates) return
-      call self%iterative%analyse(matrix, error)
-      if (allocated(error)) return
-      step = iterative_work(self%iterative)
-      self%iterates = self%prefers_iterations .or. takes_less(self, matrix%n_row, step)
+      if (self%iterates) then
+         call self%iterative%analyse(matrix, error)
+         if (allocated(error)) return
+         step = iterative_work(self%iterative)
+         self%iterates = self%prefers_iterations .or. takes_less(self, matrix%n_row, step)
+      end if
+      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), &
+         self%n_operation/dense_gain/step)))
       if (self%iterates) then
          call self%direct%free()
       else
          call self%iterative%free()
+         call analyse_direct(self, matrix, error)
+         self%n_row = matrix%n_row
+         self%n_slot = size(matrix%column)
       end if
-      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), &
-         self%n_operation/dense_gain/step)))
    end subroutine choose
+
+   !> Order the pattern for factors, which tells what they take.
+   subroutine analyse_direct(self, matrix, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%direct%analyse(matrix, error)
+      self%n_factor = self%direct%n_factor
+      self%n_operation = self%direct%n_operation
+   end subroutine analyse_direct
+
+   !> What factors would take, by the order of the nodes: where most of them have three unknowns.
+   subroutine predict_by_nodes(self, matrix, is_predicted, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      logical, intent(out) :: is_predicted       !! else that is not known yet
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: nodes
+      real(dp) :: part
+
+      call node_blocks_quotient(matrix, nodes)
+      part = real(matrix%n_row, dp)/max(1, nodes%n_row)
+      is_predicted = part > n_side - 0.5_dp
+      if (.not. is_predicted) return
+      self%direct%may_be_rough = .false.         ! nothing is factorised
+      call self%direct%analyse(nodes, error)
+      self%direct%may_be_rough = self%may_be_rough
+      self%n_factor = int(part**2*real(self%direct%n_factor, dp), int64)
+      self%n_operation = part**3*self%direct%n_operation
+   end subroutine predict_by_nodes
 
    !> Do iterations whose steps take `step` operations take fewer of them than factors?
    pure logical function takes_less(self, n, step)
@@ -276,6 +321,7 @@ contains
       if (allocated(self%direct)) call self%direct%free()
       if (allocated(self%general)) call self%general%free()
       call self%iterative%free()
+      self%n_row = 0
       self%iterates = .false.
       self%is_incomplete = .false.
       self%is_singular = .false.

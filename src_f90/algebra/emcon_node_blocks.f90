@@ -12,7 +12,7 @@ module emcon_node_blocks
    implicit none
    private
    public :: node_blocks_t, node_blocks_init, node_blocks_fill, node_blocks_multiply, &
-      node_blocks_is_of, node_blocks_matrix, n_side
+      node_blocks_is_of, node_blocks_matrix, node_blocks_quotient, n_side
 
    !> Unknowns of a block.
    integer, parameter :: n_side = 3
@@ -101,6 +101,20 @@ contains
          if (pass == 1) allocate(self%met(n), source=0)
       end do
    end subroutine find_blocks
+
+   !> The symmetric pattern by which the blocks of a pattern meet, in the order of the unknowns.
+   pure subroutine node_blocks_quotient(matrix, quotient)
+      type(csr_t), intent(in) :: matrix          !! symmetric, its values are not read
+      type(csr_t), intent(out) :: quotient       !! without values
+      type(node_blocks_t) :: blocks
+
+      blocks%n = matrix%n_row
+      call find_blocks(blocks, matrix)
+      quotient%n_row = blocks%n_block
+      quotient%n_col = blocks%n_block
+      call move_alloc(blocks%start, quotient%row_start)
+      quotient%column = blocks%met - 1
+   end subroutine node_blocks_quotient
 
    pure logical function has_same_columns(matrix, i, j)
       type(csr_t), intent(in) :: matrix

@@ -43,6 +43,7 @@ contains
          test_case_t("where steps do not do factors are taken", test_not_converged), &
          test_case_t("not definite, not a number", test_indefinite), &
          test_case_t("counts choose", test_choice), &
+         test_case_t("nodes tell what factors take", test_prediction), &
          test_case_t("another pattern", test_pattern)]
    end subroutine collect_iterative
 
@@ -442,6 +443,31 @@ contains
          call solver%free()
       end do
    end subroutine test_choice
+
+   !> The order of the nodes tells about as many operations and entries as that of the unknowns:
+   !> within a half, as orders are found by heuristics.
+   subroutine test_prediction(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      type(csr_t) :: a
+      real(dp) :: operations(2), entries(2)
+      integer :: i
+
+      call lattice(9, 8, 7, 1.0_dp, a)
+      do i = 1, 2
+         call make_chosen(solver, merge(0.1_dp, 0.0_dp, i == 1), i == 1)
+         call solver%analyse(a, error)
+         if (allocated(error)) return
+         call check_true(error, solver%is_incomplete .eqv. i == 1, "iterations first")
+         if (allocated(error)) return
+         operations(i) = solver%n_operation
+         entries(i) = real(solver%n_factor, dp)
+         call solver%free()
+      end do
+      call check_true(error, abs(log(operations(1)/operations(2))) < log(1.5_dp), "operations")
+      if (.not. allocated(error)) call check_true(error, abs(log(entries(1)/entries(2))) &
+         < log(1.5_dp), "entries")
+   end subroutine test_prediction
 
    subroutine test_pattern(error)
       type(error_t), allocatable, intent(out) :: error
