@@ -54,6 +54,9 @@ module emcon_chosen_solver
       procedure :: has_panels => chosen_has_panels
       procedure :: reach_rows => chosen_reach_rows
       procedure :: multiply => chosen_multiply
+      procedure :: takes_rows => chosen_takes_rows
+      procedure :: take_row => chosen_take_row
+      procedure :: factorise_rows => chosen_factorise_rows
       procedure :: free => chosen_free
    end type chosen_solver_t
 
@@ -184,19 +187,51 @@ contains
       real(dp), intent(in), contiguous :: value(:)
       type(error_t), allocatable, intent(out) :: error
 
-      self%by = merge(by_iterations, by_factors, self%iterates)
-      self%is_incomplete = self%iterates
       if (self%iterates) then
          call self%iterative%factorise(value, error)
-         if (allocated(error)) return
-         self%is_singular = self%iterative%is_singular
-         self%half_scale = self%iterative%half_scale
-         if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
+         if (.not. allocated(error)) call look_at_iterations(self, error)
       else
+         self%by = by_factors
+         self%is_incomplete = .false.
          call self%direct%factorise(value, error)
          call take_figures(self, self%direct)
       end if
    end subroutine chosen_factorise
+
+   !> Factors after all of what iterations have taken, if it is not definite.
+   subroutine look_at_iterations(self, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      self%by = by_iterations
+      self%is_incomplete = .true.
+      self%is_singular = self%iterative%is_singular
+      self%half_scale = self%iterative%half_scale
+      if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
+   end subroutine look_at_iterations
+
+   pure logical function chosen_takes_rows(self)
+      class(chosen_solver_t), intent(in) :: self
+
+      chosen_takes_rows = self%iterates
+   end function chosen_takes_rows
+
+   subroutine chosen_take_row(self, i, value, error)
+      class(chosen_solver_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%iterative%take_row(i, value)
+   end subroutine chosen_take_row
+
+   subroutine chosen_factorise_rows(self, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%iterative%factorise_rows()
+      call look_at_iterations(self, error)
+   end subroutine chosen_factorise_rows
 
    !> Factors after all, of what the iterations hold.
    subroutine factorise_after_all(self, error)

@@ -24,8 +24,8 @@ module emcon_diagonal_blocks
       integer :: first = 0                       !! unknowns of the blocks before it
       integer, allocatable :: unknown(:)         !! (n) ascending
       logical :: is_range = .false.              !! which follow each other
-      !> Scale times the symmetric part; without values until there is a factor. Where it is an
-      !> incomplete one the solver has values and pattern, and here are no columns either
+      !> Scale times the symmetric part; without values until there is a factor. A solver that takes
+      !> rows has values and pattern: here are no columns then
       type(csr_t) :: matrix
       integer, allocatable :: upper(:)           !! (n) work space: places in the rows
       real(dp), allocatable :: b(:), image(:)    !! (n) work space, where they do not
@@ -83,6 +83,7 @@ contains
          self%block(b)%solver%is_scaled = .true.
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return
+         if (self%block(b)%solver%takes_rows()) deallocate(self%block(b)%matrix%column)
          self%n_entry = self%n_entry + real(self%block(b)%solver%n_factor, dp)
          self%n_operation = self%n_operation + self%block(b)%solver%n_operation
       end do
@@ -101,7 +102,8 @@ contains
       if (is_known) is_known = size(self%of) == matrix%n_row
       do b = 1, self%n_block
          if (.not. is_known) return
-         if (allocated(self%block(b)%matrix%column)) then
+         ! Behind one that is not symmetric no block has a pattern.
+         if (allocated(self%block(b)%matrix%column) .or. .not. allocated(self%block(b)%solver)) then
             is_known = is_pattern_of(self%block(b), matrix)
             cycle
          end if
@@ -318,9 +320,11 @@ contains
       !$omp parallel do default(none) shared(self, matrix) num_threads(self%n_thread) &
       !$omp schedule(dynamic, 1)
       do b = 1, self%n_block
-         if (.not. allocated(self%block(b)%matrix%column)) call extract(self, &
-            self%block(b)%unknown, matrix, self%block(b)%matrix)
-         call factorise(self%block(b), matrix, self%scale)
+         if (self%block(b)%solver%takes_rows()) then
+            call factorise_rows(self%block(b), matrix, self%place, self%scale)
+         else
+            call factorise(self%block(b), matrix, self%scale)
+         end if
       end do
       !$omp end parallel do
       call take_error(self, error)
@@ -346,8 +350,36 @@ contains
       block%n_factor = block%n_factor + 1
       call block%solver%factorise(block%matrix%value, block%error)
       block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
-      if (block%solver%is_incomplete) deallocate(block%matrix%value, block%matrix%column)
    end subroutine factorise
+
+   !> Factorise a block whose solver takes rows: entries meet those across the diagonal, which come
+   !> in the order of the rows too.
+   subroutine factorise_rows(block, matrix, place, scale)
+      type(block_t), intent(inout) :: block
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: place(:)            !! (n) of the unknowns in their blocks
+      real(dp), intent(in) :: scale
+      real(dp) :: row(maxval(block%matrix%row_start(2:) &
+         - block%matrix%row_start(:block%matrix%n_row)))
+      integer :: i, j, k, from, n
+
+      block%has_factor = .false.
+      block%n_factor = block%n_factor + 1
+      block%upper = matrix%row_start(block%unknown)      ! the last entry that was met
+      do i = 1, block%matrix%n_row
+         from = matrix%row_start(block%unknown(i))
+         n = matrix%row_start(block%unknown(i) + 1) - from
+         do k = 1, n
+            j = place(matrix%column(from + k) + 1)
+            block%upper(j) = block%upper(j) + 1
+            row(k) = scale*0.5_dp*(matrix%value(from + k) + matrix%value(block%upper(j)))
+         end do
+         call block%solver%take_row(i, row(:n), block%error)
+         if (allocated(block%error)) return
+      end do
+      call block%solver%factorise_rows(block%error)
+      block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
+   end subroutine factorise_rows
 
    !> The values of a block: entries meet those across the diagonal in the order of the rows.
    pure subroutine take_values(block, matrix, scale, is_changed)
@@ -494,7 +526,7 @@ contains
       real(dp) :: total
       integer :: i, k
 
-      if (block%solver%is_incomplete) then
+      if (block%solver%takes_rows()) then
          call block%solver%multiply(x, y, block%error)
          return
       end if
