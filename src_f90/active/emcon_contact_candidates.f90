@@ -16,7 +16,7 @@ module emcon_contact_candidates
    use emcon_friction, only : friction_close, friction_keep, friction_waits, most_lagged, &
       most_shift
    use emcon_gaps, only : gaps_follow_slips
-   use emcon_kept_factor, only : kept_factor_t
+   use emcon_kept_factor, only : kept_factor_most_iterated, kept_factor_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
@@ -28,7 +28,7 @@ module emcon_contact_candidates
    private
    public :: candidates_select, candidates_solve, &
       candidates_look, candidates_leave_out, candidates_keep_forces, candidates_are_many, &
-      candidates_are_too_many
+      candidates_are_too_many, candidates_need_factor
 
    !> Of more contacts than these trials tell the next set in dynamics too: their problem is dense.
    !> Of more than those there is no room for the problem of all of them.
@@ -49,6 +49,18 @@ contains
          real(most_together, dp)**3)**(1.0_dp/3.0_dp)))
       candidates_are_many = are_beyond(self, most)
    end function candidates_are_many
+
+   !> Does the problem of the candidates take a complete factor? By an incomplete one each of them
+   !> takes a solution: all of these more operations than to factorise, unless they are few.
+   pure logical function candidates_need_factor(self, kept)
+      type(active_set_t), intent(in) :: self
+      type(kept_factor_t), intent(in) :: kept    !! of the step
+
+      candidates_need_factor = kept%is_made .and. kept%blocks%is_incomplete &
+         .and. .not. candidates_are_many(self, kept)
+      if (candidates_need_factor) candidates_need_factor = are_beyond(self, &
+         kept_factor_most_iterated(kept))
+   end function candidates_need_factor
 
    !> Are there too many candidates for a problem of all of them?
    pure logical function candidates_are_too_many(self)

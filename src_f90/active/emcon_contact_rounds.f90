@@ -15,6 +15,7 @@ module emcon_contact_rounds
    use emcon_contact_support, only : contact_support_forget
    use emcon_coulomb_law, only : contact_open, coulomb_t, slip_status_t
    use emcon_errors, only : error_t
+   use emcon_factor_policy, only : factor_policy_complete
    use emcon_friction, only : friction_look_back
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
@@ -40,7 +41,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: leads
+      logical :: leads, goes_on
 
       call candidates_clear(self%candidates)
       if (self%penalty%is_on) then
@@ -61,6 +62,16 @@ contains
       self%friction%follows = active_set_may_turn(self, system)
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
       if (allocated(error)) return
+      if (.not. self%candidates%is_settled) then
+         call factor_policy_complete(newton%factor_policy, newton%correction, goes_on)
+         if (goes_on) then
+            call contact_sets_begin_anew(self, newton, motion)
+            self%is_active = self%candidates%began
+            call begin_again(self, system, motion)
+            call contact_sets_solve(self, system, scene, newton, motion, status, error)
+            if (allocated(error)) return
+         end if
+      end if
       if (self%candidates%is_settled) then
          leads = .false.
          if (status == step_done .and. self%friction%looks_back) call friction_look_back( &

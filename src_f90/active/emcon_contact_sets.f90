@@ -13,7 +13,7 @@ module emcon_contact_sets
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact_candidates, only : candidates_are_many, &
       candidates_are_too_many, candidates_keep_forces, candidates_leave_out, candidates_look, &
-      candidates_select, candidates_solve
+      candidates_need_factor, candidates_select, candidates_solve
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_status, contact_problem_t
@@ -73,7 +73,7 @@ contains
       call active_set_open_sets(self)
       do i = 1, most_by_trials
          if (i > most_tried .and. self%rules%has_impacts &
-            .and. .not. candidates_are_too_many(self)) return
+            .and. .not. needs_trials(self, newton)) return
          if (self%support%is_needed) call hold_on(self, system, scene, newton, motion, gripped)
          status = step_not_held
          self%candidates%is_settled = is_left_free(self, is_first=i == 1)
@@ -130,6 +130,17 @@ contains
       call candidates_solve(self, system, newton, motion, status, error)
       newton%factor_policy%is_alone = .false.
    end subroutine solve_set
+
+   !> Of so many candidates, or by iterations, nothing but trials names sets.
+   pure logical function needs_trials(self, newton)
+      type(active_set_t), intent(in) :: self
+      type(newton_t), intent(in) :: newton
+
+      associate (kept => newton%correction%kept)
+         needs_trials = candidates_are_too_many(self) .or. &
+            (kept%blocks%is_incomplete .and. candidates_are_many(self, kept))
+      end associate
+   end function needs_trials
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
    !> tried on the way tells of that set alone, and so does what slides where slip has a direction:
@@ -269,6 +280,8 @@ contains
       integer :: n_row
 
       turns = .false.
+      goes_on = .not. candidates_need_factor(self, newton%correction%kept)
+      if (.not. goes_on) return
       n_row = (1 + merge(self%friction%n_slip, 0, self%friction%is_on)) &
          *count(self%candidates%takes_part)
       are_many = candidates_are_many(self, newton%correction%kept)

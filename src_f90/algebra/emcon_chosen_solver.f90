@@ -2,14 +2,16 @@
 !>
 !> Iterations come into question where solutions need not be exact (`accuracy`). The order in which
 !> a matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
-!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix
-!> turns out not to be definite, it is factorised after all, until the next values.
+!> chooses alike whenever it is repeated. Where the unknowns of nodes are blocks, as in space, the
+!> nodes are ordered for that: a ninth of the entries. Where iterations do not come to an end, or
+!> the matrix turns out not to be definite, it is factorised after all, until the next values.
 !> Source: docs/theory.md, section 8.
 module emcon_chosen_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t, iterative_work
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_node_blocks, only : n_side, node_blocks_quotient
    use emcon_row_panels, only : row_panel_t
    use emcon_sparse_solver, only : sparse_solver_t
    implicit none
@@ -40,6 +42,8 @@ module emcon_chosen_solver
       class(sparse_solver_t), allocatable :: general     !! of those that turn out otherwise
       type(iterative_solver_t) :: iterative
       integer, private :: by = by_factors
+      !> Of the pattern that was last found to be for factors; 0: there is none
+      integer, private :: n_row = 0, n_slot = 0
    contains
       procedure :: analyse => chosen_analyse
       procedure :: factorise => chosen_factorise
@@ -50,6 +54,9 @@ module emcon_chosen_solver
       procedure :: has_panels => chosen_has_panels
       procedure :: reach_rows => chosen_reach_rows
       procedure :: multiply => chosen_multiply
+      procedure :: takes_rows => chosen_takes_rows
+      procedure :: take_row => chosen_take_row
+      procedure :: factorise_rows => chosen_factorise_rows
       procedure :: free => chosen_free
    end type chosen_solver_t
 
@@ -69,8 +76,10 @@ contains
       end if
       before = self%direct%n_analysis
       call prepare_direct(self)
-      call self%direct%analyse(matrix, error)
-      if (allocated(error) .or. self%direct%n_analysis == before) return
+      if (self%n_row == matrix%n_row .and. self%n_slot == size(matrix%column)) then
+         call self%direct%analyse(matrix, error)
+         if (allocated(error) .or. self%direct%n_analysis == before) return
+      end if
       self%n_analysis = self%n_analysis + 1
       call choose(self, matrix, error)
       self%is_incomplete = self%iterates
@@ -92,29 +101,68 @@ contains
    !> Iterations or factors? First by the entries of the matrix, then by those of its blocks, which
    !> are filled up where nodes have fewer than three unknowns.
    subroutine choose(self, matrix, error)
-      class(chosen_solver_t), intent(inout) :: self      !! `direct` has analysed the pattern
+      class(chosen_solver_t), intent(inout) :: self
       type(csr_t), intent(in) :: matrix
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: step
+      logical :: is_predicted
 
-      self%n_factor = self%direct%n_factor
-      self%n_operation = self%direct%n_operation
+      self%n_row = 0
+      is_predicted = .false.
+      if (self%accuracy > 0.0_dp) call predict_by_nodes(self, matrix, is_predicted, error)
+      if (.not. (is_predicted .or. allocated(error))) call analyse_direct(self, matrix, error)
+      if (allocated(error)) return
       step = 4.0_dp*size(matrix%column)
       self%iterates = self%accuracy > 0.0_dp .and. (self%prefers_iterations &
          .or. takes_less(self, matrix%n_row, step))
-      if (.not. self%iterates) return
-      call self%iterative%analyse(matrix, error)
-      if (allocated(error)) return
-      step = iterative_work(self%iterative)
-      self%iterates = self%prefers_iterations .or. takes_less(self, matrix%n_row, step)
+      if (self%iterates) then
+         call self%iterative%analyse(matrix, error)
+         if (allocated(error)) return
+         step = iterative_work(self%iterative)
+         self%iterates = self%prefers_iterations .or. takes_less(self, matrix%n_row, step)
+      end if
+      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), &
+         self%n_operation/dense_gain/step)))
       if (self%iterates) then
          call self%direct%free()
       else
          call self%iterative%free()
+         call analyse_direct(self, matrix, error)
+         self%n_row = matrix%n_row
+         self%n_slot = size(matrix%column)
       end if
-      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), &
-         self%n_operation/dense_gain/step)))
    end subroutine choose
+
+   !> Order the pattern for factors, which tells what they take.
+   subroutine analyse_direct(self, matrix, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%direct%analyse(matrix, error)
+      self%n_factor = self%direct%n_factor
+      self%n_operation = self%direct%n_operation
+   end subroutine analyse_direct
+
+   !> What factors would take, by the order of the nodes: where most of them have three unknowns.
+   subroutine predict_by_nodes(self, matrix, is_predicted, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      logical, intent(out) :: is_predicted       !! else that is not known yet
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: nodes
+      real(dp) :: part
+
+      call node_blocks_quotient(matrix, nodes)
+      part = real(matrix%n_row, dp)/max(1, nodes%n_row)
+      is_predicted = part > n_side - 0.5_dp
+      if (.not. is_predicted) return
+      self%direct%may_be_rough = .false.         ! nothing is factorised
+      call self%direct%analyse(nodes, error)
+      self%direct%may_be_rough = self%may_be_rough
+      self%n_factor = int(part**2*real(self%direct%n_factor, dp), int64)
+      self%n_operation = part**3*self%direct%n_operation
+   end subroutine predict_by_nodes
 
    !> Do iterations whose steps take `step` operations take fewer of them than factors?
    pure logical function takes_less(self, n, step)
@@ -139,19 +187,51 @@ contains
       real(dp), intent(in), contiguous :: value(:)
       type(error_t), allocatable, intent(out) :: error
 
-      self%by = merge(by_iterations, by_factors, self%iterates)
-      self%is_incomplete = self%iterates
       if (self%iterates) then
          call self%iterative%factorise(value, error)
-         if (allocated(error)) return
-         self%is_singular = self%iterative%is_singular
-         self%half_scale = self%iterative%half_scale
-         if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
+         if (.not. allocated(error)) call look_at_iterations(self, error)
       else
+         self%by = by_factors
+         self%is_incomplete = .false.
          call self%direct%factorise(value, error)
          call take_figures(self, self%direct)
       end if
    end subroutine chosen_factorise
+
+   !> Factors after all of what iterations have taken, if it is not definite.
+   subroutine look_at_iterations(self, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      self%by = by_iterations
+      self%is_incomplete = .true.
+      self%is_singular = self%iterative%is_singular
+      self%half_scale = self%iterative%half_scale
+      if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
+   end subroutine look_at_iterations
+
+   pure logical function chosen_takes_rows(self)
+      class(chosen_solver_t), intent(in) :: self
+
+      chosen_takes_rows = self%iterates
+   end function chosen_takes_rows
+
+   subroutine chosen_take_row(self, i, value, error)
+      class(chosen_solver_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%iterative%take_row(i, value)
+   end subroutine chosen_take_row
+
+   subroutine chosen_factorise_rows(self, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%iterative%factorise_rows()
+      call look_at_iterations(self, error)
+   end subroutine chosen_factorise_rows
 
    !> Factors after all, of what the iterations hold.
    subroutine factorise_after_all(self, error)
@@ -276,6 +356,7 @@ contains
       if (allocated(self%direct)) call self%direct%free()
       if (allocated(self%general)) call self%general%free()
       call self%iterative%free()
+      self%n_row = 0
       self%iterates = .false.
       self%is_incomplete = .false.
       self%is_singular = .false.

@@ -24,8 +24,8 @@ module emcon_diagonal_blocks
       integer :: first = 0                       !! unknowns of the blocks before it
       integer, allocatable :: unknown(:)         !! (n) ascending
       logical :: is_range = .false.              !! which follow each other
-      !> Scale times the symmetric part; without values until there is a factor, and where it is an
-      !> incomplete one: the solver has them then
+      !> Scale times the symmetric part; without values until there is a factor. A solver that takes
+      !> rows has values and pattern: here are no columns then
       type(csr_t) :: matrix
       integer, allocatable :: upper(:)           !! (n) work space: places in the rows
       real(dp), allocatable :: b(:), image(:)    !! (n) work space, where they do not
@@ -61,16 +61,19 @@ contains
       logical, intent(out) :: is_new             !! it is another pattern
       type(error_t), allocatable, intent(out) :: error
       integer :: b
+      logical :: is_known
 
-      is_new = .not. is_known(self, matrix)
-      if (.not. is_new) return
+      call compare(self, matrix, is_known, error)
+      is_new = .not. is_known
+      if (is_known .or. allocated(error)) return
       call blocks_free(self)
       call find_blocks(self, matrix)
       self%n_entry = 0.0_dp
       self%n_operation = 0.0_dp
       self%is_symmetric = .true.
       do b = 1, self%n_block
-         call extract(self, self%block(b), matrix)
+         call begin_block(self%block(b))
+         call extract(self, self%block(b)%unknown, matrix, self%block(b)%matrix)
          self%is_symmetric = self%is_symmetric .and. csr_is_symmetric(self%block(b)%matrix)
          if (.not. self%is_symmetric) return
          allocate(self%block(b)%solver, source=self%kind)
@@ -80,33 +83,77 @@ contains
          self%block(b)%solver%is_scaled = .true.
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return
+         if (self%block(b)%solver%takes_rows()) deallocate(self%block(b)%matrix%column)
          self%n_entry = self%n_entry + real(self%block(b)%solver%n_factor, dp)
          self%n_operation = self%n_operation + self%block(b)%solver%n_operation
       end do
    end subroutine blocks_analyse
 
    !> Is it the pattern of the blocks?
-   pure logical function is_known(self, matrix)
-      type(diagonal_blocks_t), intent(in) :: self
+   subroutine compare(self, matrix, is_known, error)
+      type(diagonal_blocks_t), intent(inout) :: self
       type(csr_t), intent(in) :: matrix
-      integer :: b, i, from, to
+      logical, intent(out) :: is_known
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: present
+      integer :: b, before
 
       is_known = allocated(self%block) .and. allocated(self%of)
       if (is_known) is_known = size(self%of) == matrix%n_row
       do b = 1, self%n_block
          if (.not. is_known) return
-         associate (block => self%block(b), rows => self%block(b)%matrix)
-            do i = 1, rows%n_row
-               from = matrix%row_start(block%unknown(i)) + 1
-               to = matrix%row_start(block%unknown(i) + 1)
-               is_known = to - from + 1 == rows%row_start(i + 1) - rows%row_start(i)
-               if (is_known) is_known = all(matrix%column(from:to) + 1 &
-                  == block%unknown(rows%column(rows%row_start(i) + 1:rows%row_start(i + 1)) + 1))
-               if (.not. is_known) return
-            end do
+         ! Behind one that is not symmetric no block has a pattern.
+         if (allocated(self%block(b)%matrix%column) .or. .not. allocated(self%block(b)%solver)) then
+            is_known = is_pattern_of(self%block(b), matrix)
+            cycle
+         end if
+         associate (block => self%block(b))
+            is_known = keeps_within(self, b, matrix)
+            if (.not. is_known) return
+            call extract(self, block%unknown, matrix, present)
+            before = block%solver%n_analysis
+            call block%solver%analyse(present, error)
+            if (allocated(error)) return
+            is_known = block%solver%n_analysis == before
          end associate
       end do
-   end function is_known
+   end subroutine compare
+
+   !> Is it the pattern of a block that has one?
+   pure logical function is_pattern_of(block, matrix) result(is_known)
+      type(block_t), intent(in) :: block
+      type(csr_t), intent(in) :: matrix
+      integer :: i, from, to
+
+      associate (rows => block%matrix)
+         is_known = .true.
+         do i = 1, rows%n_row
+            from = matrix%row_start(block%unknown(i)) + 1
+            to = matrix%row_start(block%unknown(i) + 1)
+            is_known = to - from + 1 == rows%row_start(i + 1) - rows%row_start(i)
+            if (is_known) is_known = all(matrix%column(from:to) + 1 &
+               == block%unknown(rows%column(rows%row_start(i) + 1:rows%row_start(i + 1)) + 1))
+            if (.not. is_known) return
+         end do
+      end associate
+   end function is_pattern_of
+
+   !> Do the unknowns of block `b` meet none of others?
+   pure logical function keeps_within(self, b, matrix)
+      type(diagonal_blocks_t), intent(in) :: self
+      integer, intent(in) :: b
+      type(csr_t), intent(in) :: matrix
+      integer :: i
+
+      keeps_within = .true.
+      do i = 1, size(self%block(b)%unknown)
+         associate (first => matrix%row_start(self%block(b)%unknown(i)) + 1, &
+               last => matrix%row_start(self%block(b)%unknown(i) + 1))
+            keeps_within = all(self%of(matrix%column(first:last) + 1) == b)
+         end associate
+         if (.not. keeps_within) return
+      end do
+   end function keeps_within
 
    !> Which unknowns hang together: `of`, `place`, and the unknowns of the blocks, the largest one
    !> first.
@@ -201,32 +248,41 @@ contains
       extent = size_of(:n)
    end subroutine join_small
 
-   !> The pattern of a block, and its work space.
-   pure subroutine extract(self, block, matrix)
-      type(diagonal_blocks_t), intent(in) :: self
+   !> The work space of a block.
+   pure subroutine begin_block(block)
       type(block_t), intent(inout) :: block      !! `unknown` is set
-      type(csr_t), intent(in) :: matrix
-      integer :: i, k, n, m
+      integer :: n
 
       n = size(block%unknown)
       block%is_range = block%unknown(n) - block%unknown(1) == n - 1
-      block%matrix%n_row = n
-      block%matrix%n_col = n
-      allocate(block%matrix%row_start(n + 1), source=0)
-      do i = 1, n
-         block%matrix%row_start(i + 1) = block%matrix%row_start(i) &
-            + matrix%row_start(block%unknown(i) + 1) - matrix%row_start(block%unknown(i))
-      end do
-      m = block%matrix%row_start(n + 1)
-      allocate(block%matrix%column(m), source=0)
-      do i = 1, n
-         m = block%matrix%row_start(i) - matrix%row_start(block%unknown(i))
-         do k = matrix%row_start(block%unknown(i)) + 1, matrix%row_start(block%unknown(i) + 1)
-            block%matrix%column(k + m) = self%place(matrix%column(k) + 1) - 1
-         end do
-      end do
       allocate(block%upper(n), source=0)
       if (.not. block%is_range) allocate(block%b(n), block%image(n), source=0.0_dp)
+   end subroutine begin_block
+
+   !> The pattern of the block of these unknowns, without values.
+   pure subroutine extract(self, unknown, matrix, pattern)
+      type(diagonal_blocks_t), intent(in) :: self
+      integer, intent(in) :: unknown(:)          !! (n) all of a block
+      type(csr_t), intent(in) :: matrix
+      type(csr_t), intent(out) :: pattern
+      integer :: i, k, n, m
+
+      n = size(unknown)
+      pattern%n_row = n
+      pattern%n_col = n
+      allocate(pattern%row_start(n + 1), source=0)
+      do i = 1, n
+         pattern%row_start(i + 1) = pattern%row_start(i) &
+            + matrix%row_start(unknown(i) + 1) - matrix%row_start(unknown(i))
+      end do
+      m = pattern%row_start(n + 1)
+      allocate(pattern%column(m), source=0)
+      do i = 1, n
+         m = pattern%row_start(i) - matrix%row_start(unknown(i))
+         do k = matrix%row_start(unknown(i)) + 1, matrix%row_start(unknown(i) + 1)
+            pattern%column(k + m) = self%place(matrix%column(k) + 1) - 1
+         end do
+      end do
    end subroutine extract
 
    !> Factorise the symmetric part of the matrix whose pattern was analysed, and is symmetric.
@@ -243,7 +299,11 @@ contains
       !$omp parallel do default(none) shared(self, matrix) num_threads(self%n_thread) &
       !$omp schedule(dynamic, 1)
       do b = 1, self%n_block
-         call factorise(self%block(b), matrix, self%scale)
+         if (self%block(b)%solver%takes_rows()) then
+            call factorise_rows(self%block(b), matrix, self%place, self%scale)
+         else
+            call factorise(self%block(b), matrix, self%scale)
+         end if
       end do
       !$omp end parallel do
       call take_error(self, error)
@@ -269,8 +329,36 @@ contains
       block%n_factor = block%n_factor + 1
       call block%solver%factorise(block%matrix%value, block%error)
       block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
-      if (block%solver%is_incomplete) deallocate(block%matrix%value)
    end subroutine factorise
+
+   !> Factorise a block whose solver takes rows: entries meet those across the diagonal, which come
+   !> in the order of the rows too.
+   subroutine factorise_rows(block, matrix, place, scale)
+      type(block_t), intent(inout) :: block
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: place(:)            !! (n) of the unknowns in their blocks
+      real(dp), intent(in) :: scale
+      real(dp) :: row(maxval(block%matrix%row_start(2:) &
+         - block%matrix%row_start(:block%matrix%n_row)))
+      integer :: i, j, k, from, n
+
+      block%has_factor = .false.
+      block%n_factor = block%n_factor + 1
+      block%upper = matrix%row_start(block%unknown)      ! the last entry that was met
+      do i = 1, block%matrix%n_row
+         from = matrix%row_start(block%unknown(i))
+         n = matrix%row_start(block%unknown(i) + 1) - from
+         do k = 1, n
+            j = place(matrix%column(from + k) + 1)
+            block%upper(j) = block%upper(j) + 1
+            row(k) = scale*0.5_dp*(matrix%value(from + k) + matrix%value(block%upper(j)))
+         end do
+         call block%solver%take_row(i, row(:n), block%error)
+         if (allocated(block%error)) return
+      end do
+      call block%solver%factorise_rows(block%error)
+      block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
+   end subroutine factorise_rows
 
    !> The values of a block: entries meet those across the diagonal in the order of the rows.
    pure subroutine take_values(block, matrix, scale, is_changed)
@@ -417,7 +505,7 @@ contains
       real(dp) :: total
       integer :: i, k
 
-      if (block%solver%is_incomplete) then
+      if (block%solver%takes_rows()) then
          call block%solver%multiply(x, y, block%error)
          return
       end if
@@ -520,6 +608,7 @@ contains
       end if
       if (allocated(self%of)) deallocate(self%of, self%place)
       self%n_block = 0
+      self%is_incomplete = .false.
    end subroutine blocks_free
 
 end module emcon_diagonal_blocks

@@ -16,7 +16,7 @@ module emcon_iterative_solver
       incomplete_cholesky_factorise, incomplete_cholesky_forward, incomplete_cholesky_t
    use emcon_kinds, only : dp, wp
    use emcon_node_blocks, only : n_side, node_blocks_fill, node_blocks_init, node_blocks_is_of, &
-      node_blocks_matrix, node_blocks_multiply, node_blocks_t
+      node_blocks_matrix, node_blocks_multiply, node_blocks_t, node_blocks_take_row
    use emcon_power_scaling, only : power_of_two
    use emcon_sparse_solver, only : solver_check_square
    use emcon_text, only : to_text
@@ -38,6 +38,7 @@ module emcon_iterative_solver
       integer :: most_steps = 1000               !! of a solve
       integer :: n_step = 0                      !! of the last one
       logical :: is_filled = .false.             !! the blocks have values
+      logical, private :: is_sound = .false.     !! those that were taken so far can be factorised
       type(node_blocks_t), private :: blocks     !! half_scale times the matrix
       type(incomplete_cholesky_t), private :: factor
       integer, private :: first_slot = 0         !! of the entry (1, 1); 0: not there
@@ -46,6 +47,8 @@ module emcon_iterative_solver
    contains
       procedure :: analyse => iterative_analyse
       procedure :: factorise => iterative_factorise
+      procedure :: take_row => iterative_take_row
+      procedure :: factorise_rows => iterative_factorise_rows
       procedure :: solve => iterative_solve
       procedure :: solve_half => iterative_solve_half
       procedure :: multiply => iterative_multiply
@@ -75,7 +78,6 @@ contains
       class(iterative_solver_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: value(:)
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_definite
 
       self%is_singular = .true.
       self%is_filled = .false.
@@ -84,15 +86,57 @@ contains
             " values for " // to_text(self%blocks%n_slot) // " entries")
          return
       end if
-      if (self%first_slot == 0 .or. .not. all(ieee_is_finite(value))) return
-      if (.not. value(self%first_slot) > 0.0_dp) return
-      if (.not. self%is_scaled) self%half_scale = power_of_two(-exponent(value(self%first_slot)))
-      if (.not. all(abs(self%half_scale*value) < largest)) return
+      call begin_values(self, value)
+      if (self%is_sound) self%is_sound = are_sound(self, value)
+      if (.not. self%is_sound) return
       call node_blocks_fill(self%blocks, self%half_scale, value)
+      call self%factorise_rows()
+   end subroutine iterative_factorise
+
+   !> Values are to be taken, of which the first ones are these.
+   subroutine begin_values(self, value)
+      class(iterative_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)
+
+      self%is_singular = .true.
+      self%is_filled = .false.
+      self%is_sound = self%first_slot > 0
+      if (self%is_sound) self%is_sound = value(self%first_slot) > 0.0_dp
+      if (self%is_sound) self%is_sound = ieee_is_finite(value(self%first_slot))
+      if (self%is_sound .and. .not. self%is_scaled) &
+         self%half_scale = power_of_two(-exponent(value(self%first_slot)))
+   end subroutine begin_values
+
+   !> Are values numbers in the range of single precision?
+   pure logical function are_sound(self, value)
+      class(iterative_solver_t), intent(in) :: self
+      real(dp), intent(in), contiguous :: value(:)
+
+      are_sound = all(ieee_is_finite(value))
+      if (are_sound) are_sound = all(abs(self%half_scale*value) < largest)
+   end function are_sound
+
+   !> The values of row `i` of the pattern; rows come one after the other, from the first on.
+   subroutine iterative_take_row(self, i, value)
+      class(iterative_solver_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(dp), intent(in), contiguous :: value(:)
+
+      if (i == 1) call begin_values(self, value)
+      if (self%is_sound) self%is_sound = are_sound(self, value)
+      if (self%is_sound) call node_blocks_take_row(self%blocks, i, self%half_scale, value)
+   end subroutine iterative_take_row
+
+   !> An incomplete factor of what was taken.
+   subroutine iterative_factorise_rows(self)
+      class(iterative_solver_t), intent(inout) :: self
+      logical :: is_definite
+
+      if (.not. self%is_sound) return
       self%is_filled = .true.
       call incomplete_cholesky_factorise(self%factor, self%blocks, is_definite)
       self%is_singular = .not. is_definite
-   end subroutine iterative_factorise
+   end subroutine iterative_factorise_rows
 
    !> Steps until the residual is small enough, from x = 0.
    subroutine iterative_solve(self, rhs, x, error)

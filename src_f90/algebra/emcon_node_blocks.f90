@@ -11,8 +11,8 @@ module emcon_node_blocks
    use emcon_sort, only : find_sorted
    implicit none
    private
-   public :: node_blocks_t, node_blocks_init, node_blocks_fill, node_blocks_multiply, &
-      node_blocks_is_of, node_blocks_matrix, n_side
+   public :: node_blocks_t, node_blocks_init, node_blocks_fill, node_blocks_take_row, &
+      node_blocks_multiply, node_blocks_is_of, node_blocks_matrix, node_blocks_quotient, n_side
 
    !> Unknowns of a block.
    integer, parameter :: n_side = 3
@@ -30,6 +30,7 @@ module emcon_node_blocks
       integer, allocatable, private :: start(:)  !! (n_block + 1) before those that it meets
       integer, allocatable, private :: met(:)    !! ascending, itself among them
       integer, allocatable, private :: number(:) !! (n_block) of each as numbered above
+      integer, private :: taken = 0              !! block of the row that was taken last
    end type node_blocks_t
 
    !> Blocks as they are walked through.
@@ -101,6 +102,20 @@ contains
          if (pass == 1) allocate(self%met(n), source=0)
       end do
    end subroutine find_blocks
+
+   !> The symmetric pattern by which the blocks of a pattern meet, in the order of the unknowns.
+   pure subroutine node_blocks_quotient(matrix, quotient)
+      type(csr_t), intent(in) :: matrix          !! symmetric, its values are not read
+      type(csr_t), intent(out) :: quotient       !! without values
+      type(node_blocks_t) :: blocks
+
+      blocks%n = matrix%n_row
+      call find_blocks(blocks, matrix)
+      quotient%n_row = blocks%n_block
+      quotient%n_col = blocks%n_block
+      call move_alloc(blocks%start, quotient%row_start)
+      quotient%column = blocks%met - 1
+   end subroutine node_blocks_quotient
 
    pure logical function has_same_columns(matrix, i, j)
       type(csr_t), intent(in) :: matrix
@@ -228,31 +243,77 @@ contains
       type(node_blocks_t), intent(inout) :: self
       real(dp), intent(in) :: factor
       real(dp), intent(in), contiguous :: value(:)       !! (n_slot) of the pattern
-      integer, allocatable :: at(:)
-      integer :: b, c, k, p, t, n
+      integer :: i, k, n
 
-      allocate(at(self%n_block))
       k = 0
-      do b = 1, self%n_block
-         associate (row => self%number(b))
-            do t = self%row_start(row) + 1, self%row_start(row + 1)
-               at(self%column(t)) = t
-               self%value(:, :, t) = 0.0_dp
-            end do
-            do p = 1, self%first(b + 1) - self%first(b)
-               do t = self%start(b) + 1, self%start(b + 1)
-                  c = self%number(self%met(t))
-                  n = self%first(self%met(t) + 1) - self%first(self%met(t))
-                  if (c <= row) self%value(p, :n, at(c)) = factor*value(k + 1:k + n)
-                  k = k + n
-               end do
-            end do
-            do p = self%first(b + 1) - self%first(b) + 1, n_side
-               self%value(p, p, self%row_start(row + 1)) = 1.0_dp
-            end do
-         end associate
+      do i = 1, self%n
+         n = row_length(self, i)
+         call node_blocks_take_row(self, i, factor, value(k + 1:k + n))
+         k = k + n
       end do
    end subroutine node_blocks_fill
+
+   !> The entries of row `i` of the pattern, behind the rows before it.
+   pure integer function row_length(self, i)
+      type(node_blocks_t), intent(in) :: self
+      integer, intent(in) :: i
+      integer :: t
+
+      row_length = 0
+      associate (b => block_behind(self, i))
+         do t = self%start(b) + 1, self%start(b + 1)
+            row_length = row_length + self%first(self%met(t) + 1) - self%first(self%met(t))
+         end do
+      end associate
+   end function row_length
+
+   !> The block of row `i`, where rows before it were taken last.
+   pure integer function block_behind(self, i) result(b)
+      type(node_blocks_t), intent(in) :: self
+      integer, intent(in) :: i
+
+      b = 1
+      if (i > 1) b = merge(self%taken + 1, self%taken, i > self%first(self%taken + 1))
+   end function block_behind
+
+   !> Take `factor` times the values of row `i`; rows come one after the other, from the first on.
+   pure subroutine node_blocks_take_row(self, i, factor, value)
+      type(node_blocks_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(dp), intent(in) :: factor
+      real(dp), intent(in), contiguous :: value(:)       !! of the row's entries
+      integer :: b, k, n, p, t
+
+      b = block_behind(self, i)
+      self%taken = b
+      p = i - self%first(b)
+      associate (row => self%number(b))
+         if (p == 1) call clear_row(self, b)
+         k = 0
+         do t = self%start(b) + 1, self%start(b + 1)
+            n = self%first(self%met(t) + 1) - self%first(self%met(t))
+            associate (c => self%number(self%met(t)))
+               if (c <= row) self%value(p, :n, slot_of(self, row, c)) = factor*value(k + 1:k + n)
+            end associate
+            k = k + n
+         end do
+      end associate
+   end subroutine node_blocks_take_row
+
+   !> No values in the blocks before and on the diagonal in the row of block `b`, and one at the
+   !> unknowns that fill it up.
+   pure subroutine clear_row(self, b)
+      type(node_blocks_t), intent(inout) :: self
+      integer, intent(in) :: b
+      integer :: p
+
+      associate (row => self%number(b))
+         self%value(:, :, self%row_start(row) + 1:self%row_start(row + 1)) = 0.0_dp
+         do p = self%first(b + 1) - self%first(b) + 1, n_side
+            self%value(p, p, self%row_start(row + 1)) = 1.0_dp
+         end do
+      end associate
+   end subroutine clear_row
 
    !> `factor` times the matrix by single entries, in full.
    pure subroutine node_blocks_matrix(self, factor, matrix)

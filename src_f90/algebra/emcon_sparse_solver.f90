@@ -61,6 +61,9 @@ module emcon_sparse_solver
       procedure :: has_panels
       procedure :: reach_rows
       procedure :: multiply
+      procedure :: takes_rows
+      procedure :: take_row
+      procedure :: factorise_rows
    end type sparse_solver_t
 
    !> For arrays of solvers.
@@ -165,6 +168,32 @@ contains
 
       call raise(error, err_internal, "a solver that has factors was asked for the matrix")
    end subroutine multiply
+
+   !> Known after `analyse`: is a matrix given row by row, by `take_row` and `factorise_rows` in
+   !> place of `factorise`, so that nobody needs another copy of it? Not unless overridden.
+   pure logical function takes_rows(self)
+      class(sparse_solver_t), intent(in) :: self
+
+      takes_rows = .false.
+   end function takes_rows
+
+   !> The values of row `i` of the analysed pattern; for who `takes_rows`, from the first row on.
+   subroutine take_row(self, i, value, error)
+      class(sparse_solver_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(dp), intent(in), contiguous :: value(:)       !! as the columns of the row
+      type(error_t), allocatable, intent(out) :: error
+
+      call raise(error, err_internal, "a solver that takes matrices as a whole was given a row")
+   end subroutine take_row
+
+   !> Factorise the matrix whose rows were given; look at `is_singular` afterwards.
+   subroutine factorise_rows(self, error)
+      class(sparse_solver_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      call raise(error, err_internal, "a solver that takes matrices as a whole has no rows")
+   end subroutine factorise_rows
 
    !> Factorise `value`, of the analysed pattern, unless the last factors are those of these values:
    !> matrices of linear bodies stay the same.

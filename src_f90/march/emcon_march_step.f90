@@ -29,7 +29,6 @@ module emcon_march_step
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_steps, only : method_null_space
-   use emcon_solver_registry, only : solver_default
    use emcon_system, only : system_find_energy, system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
@@ -163,11 +162,10 @@ contains
             .and. (correction%method == method_null_space .or. self%system%n_constraint == 0)
          if (self%active%friction%is_on) factor_policy%is_allowed = factor_policy%is_allowed &
             .and. active_set_may_turn(self%active, self%system)
-         ! Of sets that change from step to step the factor may lead nowhere: then iterations with
-         ! it do so more often, unless they are asked for.
+         ! What rubs or gives way is found by what each contact moves, which a factor tells.
          call kept_factor_let_iterate(correction%kept, factor_policy%is_wanted .and. &
-            (self%system%n_constraint == 0 .or. (correction%choice /= solver_default .and. &
-            .not. (self%active%friction%is_on .or. self%active%penalty%is_on))))
+            (self%system%n_constraint == 0 .or. .not. (self%active%friction%is_on .or. &
+            self%active%penalty%is_on .or. self%state%base%iterates_no_more)))
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
             self%state%clock%increment, is_lost)
          if (.not. is_lost) return

@@ -12,7 +12,7 @@ module emcon_factor_policy
    use emcon_evaluation, only : instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_forget_rows, kept_factor_is_possible, kept_factor_look, &
+      kept_factor_forget_rows, kept_factor_is_possible, kept_factor_let_iterate, kept_factor_look, &
       kept_factor_multipliers, kept_factor_reach, kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
@@ -21,7 +21,7 @@ module emcon_factor_policy
    implicit none
    private
    public :: factor_policy_t, factor_policy_step, factor_policy_offer, factor_policy_begin, &
-      factor_policy_make, &
+      factor_policy_make, factor_policy_complete, &
       factor_policy_renew, factor_policy_correct, factor_policy_break_off, factor_policy_give_up, &
       factor_policy_commit, factor_policy_forget, factor_policy_looks, factor_policy_provide, &
       factor_policy_may_provide
@@ -39,6 +39,7 @@ module emcon_factor_policy
       logical :: is_alone = .false.              !! no tangents follow where it does not serve
       type(factor_base_t) :: base                !! of the present factor
       logical, private :: is_tried = .false.     !! in the present step
+      logical, private :: iterates_no_more = .false. !! iterations have led nowhere: see the base
       logical, private :: is_new = .false.       !! made in it
       integer, private :: n_failure = 0          !! solves of the present step that it has failed
       logical, private :: knows_set = .false.    !! it has taken the solve's constraints
@@ -77,6 +78,7 @@ contains
       logical, intent(out) :: is_lost                !! and `self%base` says how to make it again
 
       is_lost = .false.
+      self%iterates_no_more = base%iterates_no_more
       call kept_factor_forget_rows(correction%kept)
       if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
       self%is_tried = self%is_allowed
@@ -109,6 +111,23 @@ contains
       self%is_tried = kept_factor_is_possible(correction%kept)
       self%n_failure = 0
    end subroutine factor_policy_offer
+
+   !> Corrections by an incomplete factor have led nowhere with contacts: a complete one is to be
+   !> made, in this step and in those after it.
+   subroutine factor_policy_complete(self, correction, goes_on)
+      type(factor_policy_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+      logical, intent(out) :: goes_on            !! else it was complete, or there is to be none
+
+      goes_on = self%is_tried .and. correction%kept%blocks%is_incomplete
+      if (.not. goes_on) return
+      call kept_factor_let_iterate(correction%kept, .false.)
+      self%iterates_no_more = .true.
+      self%is_allowed = .true.
+      self%n_failure = 0
+      self%base%is_set = .false.
+      self%knows_set = .false.
+   end subroutine factor_policy_complete
 
    !> The last solve is over: how many corrections has it taken, beside the shortest one?
    pure subroutine count_solve(self)
@@ -294,6 +313,7 @@ contains
       end if
       if (self%base%is_set .and. (is_due .or. self%is_new)) base = self%base
       base%is_set = self%base%is_set
+      base%iterates_no_more = self%iterates_no_more
       base%n_least = self%base%n_least
       base%n_excess = self%base%n_excess
    end subroutine factor_policy_commit

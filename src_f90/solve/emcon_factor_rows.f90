@@ -3,13 +3,12 @@
 !> not zero, and the Cholesky factor of W^T W.
 module emcon_factor_rows
    use emcon_kinds, only : dp
-   use emcon_lapack, only : dense_cholesky_solve
    use emcon_row_pool, only : row_pool_add, row_pool_fill_products, row_pool_subtract_products, &
       row_pool_t
    implicit none
    private
    public :: factor_rows_t, factor_rows_begin, factor_rows_make_room, factor_rows_fill_products, &
-      factor_rows_subtract_products, factor_rows_add, factor_rows_project
+      factor_rows_subtract_products, factor_rows_add
 
    type :: factor_rows_t
       integer :: n = 0
@@ -19,7 +18,6 @@ module emcon_factor_rows
       real(dp), allocatable :: l(:, :)           !! (n, n) W^T W, or its factor
       logical :: by_panels = .false.             !! W is in `pool`, not in `index` and `w`
       type(row_pool_t) :: pool
-      real(dp), allocatable, private :: mu(:)    !! (n)
    end type factor_rows_t
 
 contains
@@ -30,9 +28,9 @@ contains
       integer, intent(in) :: n                   !! >= 0
 
       if (allocated(self%l)) then
-         if (self%n /= n) deallocate(self%l, self%start, self%mu)
+         if (self%n /= n) deallocate(self%l, self%start)
       end if
-      if (.not. allocated(self%l)) allocate(self%l(n, n), self%start(n + 1), self%mu(n))
+      if (.not. allocated(self%l)) allocate(self%l(n, n), self%start(n + 1))
       self%by_panels = .false.
       self%n = n
       self%start(1) = 0
@@ -119,17 +117,5 @@ contains
          end do
       end do
    end subroutine factor_rows_add
-
-   !> y = y - W (W^T W)^-1 W^T y: what of it is along no row.
-   subroutine factor_rows_project(self, y)
-      type(factor_rows_t), intent(inout) :: self !! with the factor of W^T W
-      real(dp), intent(inout), contiguous :: y(:)    !! (n_unknown)
-
-      if (self%n == 0) return
-      self%mu = 0.0_dp
-      call factor_rows_subtract_products(self, y, self%mu)
-      call dense_cholesky_solve(self%l, self%mu)
-      call factor_rows_add(self, self%mu, y)
-   end subroutine factor_rows_project
 
 end module emcon_factor_rows

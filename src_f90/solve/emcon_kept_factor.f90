@@ -17,6 +17,7 @@ module emcon_kept_factor
    use emcon_errors, only : error_t
    use emcon_factor_rows, only : factor_rows_add, factor_rows_begin, factor_rows_fill_products, &
       factor_rows_make_room, factor_rows_subtract_products, factor_rows_t
+   use emcon_gram_rows, only : gram_rows_free, gram_rows_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
    use emcon_memory, only : memory_factors, memory_go_on, memory_t, memory_take
@@ -32,7 +33,7 @@ module emcon_kept_factor
       kept_factor_let_iterate, kept_factor_look, kept_factor_serves, kept_factor_correct, &
       kept_factor_forget, kept_factor_forget_rows, kept_factor_free, kept_factor_is_possible, &
       kept_factor_has_room, kept_factor_multipliers, kept_factor_reach, kept_factor_condense, &
-      kept_factor_may_condense, kept_factor_settle, kept_factor_move
+      kept_factor_may_condense, kept_factor_most_iterated, kept_factor_settle, kept_factor_move
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -46,6 +47,9 @@ module emcon_kept_factor
    !> And of gaps in their multipliers alone: they tell which contacts act, and with two digits they
    !> tell it wrongly too often. So good are gradients of rows that are kept from set to set.
    real(dp), parameter :: condensed_accuracy = 1.0e-4_dp
+   !> Operations of a row condensed by iterations, for each entry of the matrix: two times as many
+   !> steps as a correction takes, beside which those of a complete factor are four times as fast.
+   real(dp), parameter :: condensed_operations = 4.0_dp*14.0_dp*4.0_dp
    !> From so many constraints on they go through factors of dense blocks together.
    integer, parameter :: least_panels = 200
    !> So many times the rows of a set are kept at most.
@@ -127,6 +131,7 @@ contains
 
       call kept_factor_forget(self)
       call blocks_free(self%blocks)
+      if (allocated(self%gradients)) call gram_rows_free(self%gradients%rows)
    end subroutine kept_factor_free
 
    !> Factorise the symmetric part of `matrix`; `is_made` if it is definite, and the pattern is
@@ -156,6 +161,8 @@ contains
       if (self%is_made .and. self%blocks%is_incomplete) then
          if (.not. allocated(self%gradients)) allocate(self%gradients)
          call projected_begin(self%gradients, self%diagonal)
+         if (.not. allocated(self%gradients%rows%solver)) allocate(self%gradients%rows%solver, &
+            source=self%blocks%kind)
       end if
       self%n_renewal = self%n_renewal + 1
    end subroutine kept_factor_renew
@@ -173,13 +180,15 @@ contains
       end associate
    end subroutine lay_out
 
-   !> May `n` constraints be taken, by the factor there is or a new one?
+   !> May `n` constraints be taken, by the factor there is or a new one? An incomplete one makes no
+   !> dense matrix of them.
    pure logical function kept_factor_has_room(self, n, n_entry)
       type(kept_factor_t), intent(in) :: self
       integer, intent(in) :: n                   !! >= 0
       integer, intent(in) :: n_entry             !! of the matrix that a new one would be of
 
-      kept_factor_has_room = n**2 <= self%most_products*merge(self%n_slot, n_entry, self%is_made)
+      kept_factor_has_room = (self%is_made .and. self%blocks%is_incomplete) .or. &
+         n**2 <= self%most_products*merge(self%n_slot, n_entry, self%is_made)
    end function kept_factor_has_room
 
    !> Take the constraints of `set` at their present gradients, or, of many, at nearly these.
@@ -193,6 +202,12 @@ contains
       is_fit = self%is_made .and. kept_factor_has_room(self, set%n_row, self%n_slot) &
          .and. .not. (self%blocks%is_incomplete .and. set%penalty%is_on)
       if (.not. is_fit) return
+      if (self%blocks%is_incomplete) then
+         call begin_rows(self, set%n_row)
+         call gram_rows_take(self%gradients%rows, set%gap_rows, set%n_row, self%gradients%root, &
+            is_fit, error)
+         return
+      end if
       if (is_exact) call kept_factor_forget_rows(self)
       call reach_rows(self, set, condensed_accuracy, error)
       if (allocated(error)) return
@@ -229,6 +244,14 @@ contains
       end do
       call kept_factor_settle(self, set, residual, free, error)
    end subroutine kept_factor_condense
+
+   !> So many rows are condensed by iterations in the time that a complete factor takes.
+   pure integer function kept_factor_most_iterated(self)
+      type(kept_factor_t), intent(in) :: self    !! with an incomplete factor
+
+      kept_factor_most_iterated = int(min(self%blocks%n_operation &
+         /(condensed_operations*real(max(1, self%n_slot), dp)), 0.5_dp*huge(1)))
+   end function kept_factor_most_iterated
 
    !> Can `n` rows be condensed, and be given more multipliers by `kept_factor_move`?
    pure logical function kept_factor_may_condense(self, n)
@@ -279,13 +302,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: load(size(self%x))
       integer :: k
+      logical :: is_fit
 
       self%gradients%accuracy = min(self%blocks%accuracy, condensed_accuracy)
       associate (gap_rows => set%gap_rows)
-         call factor_rows_begin(self%rows, 0)
+         call gram_rows_take(self%gradients%rows, gap_rows, 0, self%gradients%root, is_fit, error)
+         if (allocated(error)) return
          load = self%x
-         call projected_solve(self%gradients, self%blocks, self%rows, [real(dp) ::], load, self%x, &
-            error)
+         call projected_solve(self%gradients, self%blocks, [real(dp) ::], load, self%x, error)
          if (allocated(error)) return
          call multiply_rows(gap_rows, set%n_row, self%x, free)
          free = set%defect(:set%n_row) + free
@@ -294,8 +318,7 @@ contains
             associate (first => gap_rows%row_start(k) + 1, last => gap_rows%row_start(k + 1))
                load(gap_rows%column(first:last) + 1) = gap_rows%value(first:last)
             end associate
-            call projected_solve(self%gradients, self%blocks, self%rows, [real(dp) ::], load, &
-               self%x, error)
+            call projected_solve(self%gradients, self%blocks, [real(dp) ::], load, self%x, error)
             if (allocated(error)) return
             call multiply_rows(gap_rows, set%n_row, self%x, w(:, k))
          end do
@@ -318,8 +341,7 @@ contains
       end do
    end subroutine multiply_rows
 
-   !> W of the constraints, and W^T W, at gradients that are `part` off at most: in the measure of
-   !> the factor, or of the diagonal where that is incomplete.
+   !> W of the constraints, and W^T W, at gradients that are `part` off at most.
    subroutine reach_rows(self, set, part, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor
       type(constraint_set_t), intent(in) :: set
@@ -328,11 +350,7 @@ contains
       integer :: k, n
 
       call factor_rows_begin(self%rows, set%n_row)
-      if (allocated(self%mu)) then
-         if (size(self%mu) /= set%n_row) deallocate(self%mu, self%bend)
-      end if
-      if (.not. allocated(self%mu)) allocate(self%mu(set%n_row), self%bend(set%n_row))
-      self%bend = 0.0_dp
+      call begin_rows(self, set%n_row)
       if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
          call reach_panels(self, set, part, error)
          return
@@ -342,21 +360,27 @@ contains
          call factor_rows_make_room(self%rows, self%rows%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
                last => set%gap_rows%row_start(k + 1), at => self%rows%start(k) + 1)
-            if (self%blocks%is_incomplete) then
-               n = last - first + 1
-               self%rows%index(at:at + n - 1) = rows%column(first:last)
-               self%rows%w(at:at + n - 1) = rows%value(first:last) &
-                  /self%gradients%root(rows%column(first:last) + 1)
-            else
-               call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), n, &
-                  self%rows%index(at:), self%rows%w(at:), error)
-            end if
+            call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), n, &
+               self%rows%index(at:), self%rows%w(at:), error)
          end associate
          if (allocated(error)) return
          self%rows%start(k + 1) = self%rows%start(k) + n
       end do
       call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
+
+   !> Nothing is known of `n` rows yet.
+   pure subroutine begin_rows(self, n)
+      type(kept_factor_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! >= 0
+
+      if (allocated(self%mu)) then
+         if (size(self%mu) /= n) deallocate(self%mu, self%bend)
+      end if
+      if (.not. allocated(self%mu)) allocate(self%mu(n), self%bend(n))
+      self%mu = 0.0_dp
+      self%bend = 0.0_dp
+   end subroutine begin_rows
 
    !> The same by panels: only of rows that the last sets did not have. Where these are many all are
    !> made anew, as the others would take room.
@@ -497,7 +521,7 @@ contains
       if (self%blocks%is_incomplete) then
          self%y = -real(residual, dp)
          self%gradients%accuracy = self%blocks%accuracy
-         call projected_solve(self%gradients, self%blocks, self%rows, &
+         call projected_solve(self%gradients, self%blocks, &
             real(set%defect(:set%n_row), dp), self%y, self%x, error)
          if (.not. allocated(error)) dq = real(self%x, wp)
          return

@@ -18,8 +18,8 @@ module emcon_newton
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_begin, factor_policy_break_off, &
-      factor_policy_correct, factor_policy_give_up, factor_policy_looks, factor_policy_make, &
-      factor_policy_renew, factor_policy_t
+      factor_policy_complete, factor_policy_correct, factor_policy_give_up, factor_policy_looks, &
+      factor_policy_make, factor_policy_renew, factor_policy_t
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_serves
    use emcon_kinds, only : dp, int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
@@ -119,7 +119,7 @@ contains
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: lam(:)
-      logical :: is_done
+      logical :: is_done, goes_on
 
       set%penalty%is_under_way = set%penalty%is_on .and. &
          .not. evaluation_is_equilibrium(motion%evaluation)
@@ -130,6 +130,12 @@ contains
          status, is_done, error)
       if (is_done .or. allocated(error)) return
       if (set%n > 0) set%lam = lam
+      if (set%n_row > 0) then
+         call factor_policy_complete(self%factor_policy, self%correction, goes_on)
+         if (goes_on) call solve_by_kept_factor(self, system, set, motion, status, is_done, error)
+         if (is_done .or. allocated(error)) return
+         if (set%n > 0) set%lam = lam
+      end if
       status = newton_diverged
       if (self%factor_policy%is_alone) return
       call solve_by_tangents(self, system, set, motion, status, error)

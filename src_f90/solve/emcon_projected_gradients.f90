@@ -11,9 +11,8 @@ module emcon_projected_gradients
       gradients_t, gradients_turn
    use emcon_diagonal_blocks, only : blocks_multiply, blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
-   use emcon_factor_rows, only : factor_rows_add, factor_rows_project, factor_rows_t
+   use emcon_gram_rows, only : gram_rows_meet, gram_rows_project, gram_rows_t
    use emcon_kinds, only : dp
-   use emcon_lapack, only : dense_cholesky_solve
    implicit none
    private
    public :: projected_gradients_t, projected_begin, projected_solve
@@ -25,6 +24,7 @@ module emcon_projected_gradients
       integer :: n_step = 0                      !! of all corrections so far
       real(dp) :: accuracy = 0.0_dp              !! of a correction, > 0, set before
       real(dp), allocatable :: root(:)           !! (n_unknown) of the diagonal, > 0
+      type(gram_rows_t) :: rows                  !! of the constraints last taken
       type(gradients_t), private :: gradients
       real(dp), allocatable, private :: r(:), z(:), y(:)     !! (n_unknown)
    end type projected_gradients_t
@@ -44,27 +44,24 @@ contains
    end subroutine projected_begin
 
    !> A x = rhs but for forces along the rows, G x = -defect.
-   subroutine projected_solve(self, blocks, rows, defect, rhs, x, error)
+   subroutine projected_solve(self, blocks, defect, rhs, x, error)
       type(projected_gradients_t), intent(inout) :: self
       type(diagonal_blocks_t), intent(inout) :: blocks
-      type(factor_rows_t), intent(inout) :: rows         !! of D, with the factor of W^T W
       real(dp), intent(in) :: defect(:)                  !! (n)
       real(dp), intent(in), contiguous :: rhs(:)         !! (n_unknown)
       real(dp), intent(out), contiguous :: x(:)          !! (n_unknown)
       type(error_t), allocatable, intent(out) :: error
-      real(dp) :: mu(rows%n)
 
-      mu = -defect
-      if (rows%n > 0) call dense_cholesky_solve(rows%l, mu)
-      x = 0.0_dp
-      call factor_rows_add(rows, mu, x)
+      call gram_rows_meet(self%rows, -defect, x, error)
+      if (allocated(error)) return
       x = x/self%root
       call blocks_multiply(blocks, x, self%r, error)
       if (allocated(error)) return
       self%r = (blocks%scale*rhs - self%r)/self%root
-      call factor_rows_project(rows, self%r)
+      call gram_rows_project(self%rows, self%r, error)
+      if (allocated(error)) return
       self%r = self%r*self%root
-      call precondition(self, blocks, rows, error)
+      call precondition(self, blocks, error)
       if (allocated(error)) return
       call gradients_begin(self%gradients, self%r, self%z)
       do while (self%gradients%is_definite .and. self%gradients%n < most_steps)
@@ -73,7 +70,7 @@ contains
          if (allocated(error)) return
          call gradients_move(self%gradients, self%y, x, self%r)
          if (.not. self%gradients%is_definite) exit
-         call precondition(self, blocks, rows, error)
+         call precondition(self, blocks, error)
          if (allocated(error)) return
          call gradients_turn(self%gradients, self%r, self%z)
       end do
@@ -81,28 +78,28 @@ contains
    end subroutine projected_solve
 
    !> z of the present residual.
-   subroutine precondition(self, blocks, rows, error)
+   subroutine precondition(self, blocks, error)
       type(projected_gradients_t), intent(inout) :: self
       type(diagonal_blocks_t), intent(inout) :: blocks
-      type(factor_rows_t), intent(inout) :: rows
       type(error_t), allocatable, intent(out) :: error
 
       self%z = self%r
-      if (rows%n > 0) call project(self%z, .false.)
+      if (self%rows%n > 0) call project(self%z, .false.)
+      if (allocated(error)) return
       call blocks_solve(blocks, .false., self%z, self%y, error)
       if (.not. allocated(error)) call blocks_solve(blocks, .true., self%y, self%z, error)
-      if (rows%n > 0) call project(self%z, .true.)
+      if (self%rows%n > 0 .and. .not. allocated(error)) call project(self%z, .true.)
 
    contains
 
       !> Of a motion what keeps the constraints, of forces what is along none.
       subroutine project(v, is_motion)
-         real(dp), intent(inout) :: v(:)         !! (n_unknown)
+         real(dp), intent(inout), contiguous :: v(:)     !! (n_unknown)
          logical, intent(in) :: is_motion        !! else forces
 
          if (is_motion) v = v*self%root
          if (.not. is_motion) v = v/self%root
-         call factor_rows_project(rows, v)
+         call gram_rows_project(self%rows, v, error)
          if (is_motion) v = v/self%root
          if (.not. is_motion) v = v*self%root
       end subroutine project

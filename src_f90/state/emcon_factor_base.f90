@@ -16,6 +16,8 @@ module emcon_factor_base
       real(wp) :: h = 0.0_wp                     !! and its size [T]
       real(wp), allocatable :: u0(:, :)          !! (n_dim, n_node) displacement at its start [L]
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) and over it [L]
+      !> Iterations have led to no set of contacts: complete factors in what is left of the step
+      logical :: iterates_no_more = .false.
    end type factor_base_t
 
 end module emcon_factor_base

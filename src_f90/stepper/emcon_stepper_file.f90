@@ -341,9 +341,14 @@ contains
       type(factor_base_t), intent(inout) :: base
       real(wp), intent(in) :: u(:, :)                !! (n_dim, n_node) for its shape
       type(restart_t), intent(inout) :: restart
+      integer :: yes
 
+      yes = 1
+      base%iterates_no_more = restart_offers(restart, "factor_complete", base%iterates_no_more)
+      if (base%iterates_no_more) call restart_exchange(restart, "factor_complete", yes)
       if (.not. restart_offers(restart, "factor_u0", base%is_set)) return
-      if (.not. base%is_set) base = factor_base_t(is_set=.true.)
+      if (.not. base%is_set) base = factor_base_t(is_set=.true., &
+         iterates_no_more=base%iterates_no_more)
       if (.not. allocated(base%u0)) then
          allocate(base%u0, source=u)
          allocate(base%du, source=u)

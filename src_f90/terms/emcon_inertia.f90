@@ -264,8 +264,7 @@ contains
             value(place) = 0.0_dp          ! what is left has places of its own
          end do
       end do
-      spots%place = pack([(k, k = 1, size(value))], abs(value) > 0.0_dp)
-      spots%value = value(spots%place)
+      call list_others(value, spots)
 
    contains
 
@@ -293,6 +292,24 @@ contains
       end function stands_alone
 
    end subroutine find_spots
+
+   !> List the places that have a value. No arrays of all places: the matrix is laid out meanwhile,
+   !> and nothing later takes as much memory.
+   pure subroutine list_others(value, spots)
+      real(dp), intent(in), contiguous :: value(:)       !! in the pattern of the matrix [M]
+      type(spots_t), intent(inout) :: spots
+      integer :: k, n
+
+      n = count(abs(value) > 0.0_dp)
+      allocate(spots%place(n), spots%value(n))
+      n = 0
+      do k = 1, size(value)
+         if (.not. abs(value(k)) > 0.0_dp) cycle
+         n = n + 1
+         spots%place(n) = k
+         spots%value(n) = value(k)
+      end do
+   end subroutine list_others
 
    !> Add a factor times the mass to the values of the matrix.
    pure subroutine add_mass(n_dim, mass, spots, factor, value)

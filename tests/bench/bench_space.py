@@ -1,13 +1,14 @@
 """A cantilever of hexahedra swings: time of an increment by phases, and memory, by size.
 
     .venv/bin/python tests/bench/bench_space.py [--cells 25x7x7 ...] [--kind C3D8] [--increments 3]
-                                                [--solver NAME ...] [--static] [--bulk K]
+                                                [--solver NAME ...] [--static] [--bulk K] [--long]
 
 `--static`: it bends by its weight instead, an equal part more in each increment; Newton's method
 factorises for each iterate. `--bulk`: bulk modulus, beside a shear modulus of 40; from some 1e5
 times that on factors in single precision do not do.
 
-The largest of its own sizes, a hundred thousand hexahedra, takes some minutes and 4 GB.
+The largest of its own sizes, a hundred thousand hexahedra, takes a minute and 1 GB; with `--long` a million unknowns come
+after it, which take some minutes and 4 GB.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from timing import usage  # noqa: E402
 
 #: Cells along the beam and across.
 SIZES = ("25x7x7", "50x14x14", "100x32x32")
+MILLION = "110x55x55"
 LENGTH, STEP = 4.0, 0.01
 
 
@@ -74,11 +76,12 @@ def main() -> None:
     parser.add_argument("--solver", nargs="*", default=["DEFAULT"], help="words of SOLVER= of decks")
     parser.add_argument("--static", action="store_true", help="no inertia: Newton's method")
     parser.add_argument("--bulk", type=float, default=200.0, help="modulus (default: 200)")
+    parser.add_argument("--long", action="store_true", help="a million unknowns too")
     parser.add_argument("--program", default=PROGRAM, help="another emcon")
     options = parser.parse_args()
     print("| mesh | solver | cells | unknowns | residuals | factors | residual [s] | assemble | "
           "factorise | solve | read [s] | all [s] | memory [MB] |\n" + "|---"*13 + "|")
-    for size in options.cells:
+    for size in (*options.cells, *[MILLION]*options.long):
         cells = tuple(map(int, size.split("x")))
         for solver in options.solver:
             print("| " + " | ".join(measure(cells, solver, options)) + " |", flush=True)

@@ -21,6 +21,7 @@ program main
    use test_iterative, only : collect_iterative
    use test_diagonal_blocks, only : collect_diagonal_blocks
    use test_edge_pair, only : collect_edge_pair
+   use test_gram_rows, only : collect_gram_rows
    use test_kept_factor, only : collect_kept_factor
    use test_elimination_tree, only : collect_elimination_tree
    use test_contact_slips_space, only : collect_contact_slips_space
@@ -262,6 +263,7 @@ program main
    call run("step_begin", collect_step_begin)
    call run("diagonal_blocks", collect_diagonal_blocks)
    call run("iterative", collect_iterative)
+   call run("gram_rows", collect_gram_rows)
    call run("kept_factor", collect_kept_factor)
    call run("elimination_tree", collect_elimination_tree)
    call run("supernodal", collect_supernodal)

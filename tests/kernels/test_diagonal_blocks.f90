@@ -2,9 +2,10 @@
 !> threads.
 module test_diagonal_blocks
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_chosen_solver, only : chosen_solver_t
    use emcon_csr, only : csr_from_entries, csr_t
-   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, blocks_reach, &
-      blocks_solve, diagonal_blocks_t
+   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
+      blocks_multiply, blocks_reach, blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -33,7 +34,8 @@ contains
          test_case_t("blocks that stay the same keep their factors", test_kept), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
          test_case_t("one block that is not definite", test_indefinite), &
-         test_case_t("no factor of a pattern that is not symmetric", test_pattern)]
+         test_case_t("no factor of a pattern that is not symmetric", test_pattern), &
+         test_case_t("incomplete factors know their pattern", test_incomplete)]
    end subroutine collect_diagonal_blocks
 
    subroutine test_solve(error)
@@ -188,6 +190,80 @@ contains
          "below")
       call blocks_free(blocks)
    end subroutine test_pattern
+
+   !> The blocks keep no columns: the same pattern is found to be it, with other values, and one with
+   !> an entry between two blocks is not, nor one with as many entries elsewhere in a block.
+   subroutine test_incomplete(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a, other
+      type(diagonal_blocks_t) :: blocks
+      logical :: is_new
+      integer :: k
+
+      call make_sample(a, error)
+      if (allocated(error)) return
+      blocks%accuracy = 0.1_dp
+      call solver_create(solver_default, matrix_definite, blocks%kind)
+      select type (kind => blocks%kind)
+      type is (chosen_solver_t)
+         kind%prefers_iterations = .true.
+      end select
+      do k = 1, 4
+         other = a
+         if (k == 2) other%value = 3.0_dp*a%value
+         if (k == 3) call move_coupling(a, .false., other)
+         if (k == 4) call move_coupling(a, .true., other)
+         call blocks_analyse(blocks, other, is_new, error)
+         if (.not. allocated(error)) call check_true(error, is_new .eqv. k /= 2, "new ones are")
+         if (.not. allocated(error)) call check_products(blocks, other, error)
+         if (allocated(error)) return
+      end do
+      call blocks_free(blocks)
+   end subroutine test_incomplete
+
+   !> `a` with one coupling in another place: from unknown 1 to the farthest in its row, which goes to
+   !> one of its own block that it does not meet, or to one of the next block.
+   subroutine move_coupling(a, leaves, moved)
+      type(csr_t), intent(in) :: a
+      logical, intent(in) :: leaves              !! the block
+      type(csr_t), intent(out) :: moved
+      integer :: row(size(a%column)), column(size(a%column)), i, last, to
+      integer, allocatable :: slot(:)
+
+      do i = 1, a%n_row
+         row(a%row_start(i) + 1:a%row_start(i + 1)) = i
+      end do
+      column = a%column + 1
+      last = column(a%row_start(2))
+      to = merge(2, last + 3, leaves)            ! unknowns of the first two blocks alternate
+      where (row == 1 .and. column == last)
+         column = to
+      elsewhere (row == last .and. column == 1)
+         row = to
+      end where
+      call csr_from_entries(moved, a%n_row, a%n_col, row, column, slot)
+      moved%value(slot) = a%value
+   end subroutine move_coupling
+
+   !> Factors of `a` are incomplete, and products are those of its symmetric part.
+   subroutine check_products(blocks, a, error)
+      type(diagonal_blocks_t), intent(inout) :: blocks
+      type(csr_t), intent(in) :: a
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: x(a%n_row), y(a%n_row)
+      real(dp), allocatable :: symmetric(:, :)
+      logical :: is_singular
+
+      call blocks_factorise(blocks, a, is_singular, error)
+      if (allocated(error)) return
+      call random_number(x)
+      call check_true(error, blocks%is_incomplete .and. .not. is_singular, "incomplete")
+      if (.not. allocated(error)) call blocks_multiply(blocks, x, y, error)
+      if (allocated(error)) return
+      symmetric = 0.5_dp*(dense_of(a) + transpose(dense_of(a)))
+      call check_near(error, real(y, wp), real(blocks%scale*matmul(symmetric, x), wp), tol, &
+         real(maxval(abs(y)), wp), "A x")
+   end subroutine check_products
 
    !> Factors of `a`, in `n_thread` threads.
    subroutine prepare(blocks, a, n_thread, error)

@@ -38,11 +38,13 @@ contains
          test_case_t("without fill the factor is complete", test_complete), &
          test_case_t("as good as was asked for", test_accuracy), &
          test_case_t("both halves are the preconditioner", test_halves), &
+         test_case_t("row by row or as a whole", test_rows), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
          test_case_t("a pivot that is lost to the pattern", test_shift), &
          test_case_t("where steps do not do factors are taken", test_not_converged), &
          test_case_t("not definite, not a number", test_indefinite), &
          test_case_t("counts choose", test_choice), &
+         test_case_t("nodes tell what factors take", test_prediction), &
          test_case_t("another pattern", test_pattern)]
    end subroutine collect_iterative
 
@@ -442,6 +444,69 @@ contains
          call solver%free()
       end do
    end subroutine test_choice
+
+   !> The same bits; a row that is no number leaves no factor, until the next matrix.
+   subroutine test_rows(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: whole, rows
+      type(csr_t) :: a
+      real(dp), allocatable :: b(:), x(:), y(:)
+      real(dp) :: broken
+      integer :: i, pass
+
+      call lattice(n_x, n_y, n_z, 0.5_dp, a)
+      allocate(b(a%n_row), x(a%n_row), y(a%n_row))
+      call random_number(b)
+      call make_chosen(whole, 0.1_dp, .true.)
+      call make_chosen(rows, 0.1_dp, .true.)
+      call whole%analyse(a, error)
+      if (.not. allocated(error)) call whole%factorise(a%value, error)
+      if (.not. allocated(error)) call whole%solve_half(.false., b, x, error)
+      if (.not. allocated(error)) call rows%analyse(a, error)
+      if (.not. allocated(error)) call check_true(error, rows%takes_rows(), "it takes rows")
+      do pass = 1, 2
+         if (allocated(error)) return
+         broken = merge(ieee_value(1.0_dp, ieee_quiet_nan), 1.0_dp, pass == 1)
+         do i = 1, a%n_row
+            associate (first => a%row_start(i) + 1, last => a%row_start(i + 1))
+               call rows%take_row(i, merge(broken, 1.0_dp, i == 7)*a%value(first:last), error)
+            end associate
+            if (allocated(error)) return
+         end do
+         call rows%factorise_rows(error)
+         if (.not. allocated(error)) call check_true(error, rows%is_singular .eqv. pass == 1, &
+            "no number")
+      end do
+      if (.not. allocated(error)) call rows%solve_half(.false., b, y, error)
+      if (.not. allocated(error)) call check_true(error, .not. any(abs(x - y) > 0.0_dp), "bits")
+      call whole%free()
+      call rows%free()
+   end subroutine test_rows
+
+   !> The order of the nodes tells about as many operations and entries as that of the unknowns:
+   !> within a half, as orders are found by heuristics.
+   subroutine test_prediction(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      type(csr_t) :: a
+      real(dp) :: operations(2), entries(2)
+      integer :: i
+
+      call lattice(9, 8, 7, 1.0_dp, a)
+      do i = 1, 2
+         call make_chosen(solver, merge(0.1_dp, 0.0_dp, i == 1), i == 1)
+         call solver%analyse(a, error)
+         if (allocated(error)) return
+         call check_true(error, solver%is_incomplete .eqv. i == 1, "iterations first")
+         if (allocated(error)) return
+         operations(i) = solver%n_operation
+         entries(i) = real(solver%n_factor, dp)
+         call solver%free()
+      end do
+      call check_true(error, abs(log(operations(1)/operations(2))) < log(1.5_dp), "operations")
+      if (.not. allocated(error)) call check_true(error, abs(log(entries(1)/entries(2))) &
+         < log(1.5_dp), "entries")
+   end subroutine test_prediction
 
    subroutine test_pattern(error)
       type(error_t), allocatable, intent(out) :: error

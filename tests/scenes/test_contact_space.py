@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
+import h5py
 import numpy as np
 import overlap
 import pytest
 from contact_space_scenes import (bodies, dent, dynamic, faces, impact, pair, press, quadratic_increments, slide,
                                   stack, turned, velocities)
-from scene_tools import EPSILON, Run, run_deck
+from scene_tools import EPSILON, PROGRAM, Run, run_deck
 from space_mesh import Block
 
 #: Energy and momenta through an impact, of the largest of each.
@@ -219,6 +221,37 @@ def test_bits_do_not_depend_on_a_restart(tmp_path: Path) -> None:
     deck.write_text(impact("C3D8", "C3D8", "*RESTART, WRITE, FREQUENCY=10\n"))
     run_deck(deck, short, 0)
     assert whole.digits() == Run(short/"deck").digits()
+
+
+def test_iterations_give_way_to_factors(tmp_path: Path) -> None:
+    """Flat faces that land on each other: in sets that iterations find some rows follow from others. Factors find one,
+    from there on, and a run that is resumed knows; the motion is that of factors."""
+    one = Block("C3D8", (8, 8, 3), place=lambda x: x + np.array([0, 0, 0.003]))
+    two = Block("C3D8", (8, 8, 3), place=lambda x: x - np.array([0, 0, 1]))
+    z = np.concatenate([one.x[:, 2], two.x[:, 2]])
+    speed = np.repeat([-1.0, 0.0], [len(one.x), len(two.x)]) + 0.5*z
+    scene = (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)]) + pair()
+             + "*INITIAL CONDITIONS, TYPE=VELOCITY\n"
+             + "".join(f"{k}, 3, {v!r}\n" for k, v in enumerate(speed.tolist(), 1)))
+
+    def run(solver: str, until: float) -> Run:
+        folder = tmp_path/f"{solver}{until}"
+        folder.mkdir()
+        return ran(folder, scene + f"*STEP, NLGEOM, INC=8\n*DYNAMIC, DIRECT, SOLVER={solver}\n0.002, {until}\n"
+                   "*RESTART, WRITE, FREQUENCY=8\n*NODE FILE, FREQUENCY=8\nU\n*END STEP\n")
+
+    whole, part, direct = run("ITERATIVE", 0.016), run("ITERATIVE", 0.012), run("DIRECT", 0.016)
+    assert whole.verdict["verdict"] == "good"
+    file = tmp_path/"ITERATIVE0.012"/"deck.rst.h5"
+    with h5py.File(file) as restart:
+        assert "factor_complete" in restart["integers"]
+    subprocess.run([PROGRAM, "restart", file, "--until", "0.016", "--output", tmp_path, "--quiet"], check=True)
+    resumed = Run(tmp_path/"deck").history
+    for name in ("kinetic", "strain", "active"):
+        assert resumed[name][-1] == whole.history[name][-1]
+    assert part.history["active"].max() > 70
+    for name in ("kinetic", "strain"):
+        assert whole.history[name][-1] == pytest.approx(direct.history[name][-1], rel=1.0e-10)
 
 
 @pytest.mark.parametrize(("h", "until", "is_hill"), [(0.05, 1.5, False), (0.0125, 0.5, False), (0.05, 1.2, True)])
