@@ -18,6 +18,7 @@ module emcon_contact_newton
    use emcon_contact_trials, only : contact_slope_t
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : coulomb_t, slip_status_t
+   use emcon_early_set, only : early_enough
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_may_provide, factor_policy_provide
@@ -25,6 +26,7 @@ module emcon_contact_newton
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_may_condense
    use emcon_kinds, only : wp
    use emcon_lane_sums, only : relative_size
+   use emcon_mixed_step, only : mixed_step_begin, mixed_step_mix, mixed_step_shorten, mixed_step_t
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
       newton_early, newton_find_idle, newton_measure_forces, newton_pick_residual, newton_refused, &
@@ -51,8 +53,10 @@ module emcon_contact_newton
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
    !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
-   !> In statics so many rows are stiff in the tangent only where nothing else holds a body: without
-   !> that, pushes are found of rows that follow from others.
+   !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
+   !> solution for each row; where slip has a direction of any number. And in statics they are stiff
+   !> only where nothing else holds a body: without that, pushes are found of rows that follow from
+   !> others.
    integer, parameter :: many = 100
    !> The tangent of an iterate does for the next one if that leaves less than this part; a factor
    !> that is kept does with new rows if less than that is left.
@@ -67,11 +71,20 @@ module emcon_contact_newton
       integer :: n_stall = 0                     !! iterates since the last clear gain
    end type rest_t
 
+   !> A solve may end as `newton_early` once forces are met to a few digits, so that its caller sees
+   !> whether this is what is to be solved; the next one goes on from there.
+   type :: early_end_t
+      logical :: is_allowed = .false.            !! before a solve
+      logical, private :: is_made = .false.      !! the last solve ended so
+      logical, private :: goes_on = .false.      !! this one goes on with that
+   end type early_end_t
+
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
       type(coulomb_t), allocatable :: law(:)     !! (n) of the contacts; mu = 0: no friction
       !> Before a solve: contact alone holds a body; in it: rows are stiff in the tangent
       logical :: holds = .false.
+      type(early_end_t) :: early
       type(condensation_t), private :: condensation
       type(contact_problem_t), private :: problem
       type(contact_slope_t), private :: slope    !! of the problem that was solved last
@@ -80,7 +93,7 @@ module emcon_contact_newton
       real(wp), allocatable, private :: push(:, :)       !! (0:n_slip, n) of the condensed contacts
       !> (n) in which way the law is to hold
       type(slip_status_t), allocatable, private :: status(:)
-      real(wp), allocatable, private :: old(:), new(:)   !! (n_row) multipliers about a correction
+      type(mixed_step_t), private :: step
       type(rest_t), private :: rest
       logical, private :: is_rounding = .false.  !! nothing but round-off is left
       integer, private :: least_soft = 0         !! first of `softer` that is tried, 0: none
@@ -136,10 +149,19 @@ contains
       integer :: row(set%n_row), k, n_slip
 
       call convergence_begin(newton%convergence)
+      row = names_of(set)
+      self%early%goes_on = .false.
+      if (self%early%is_made .and. allocated(self%row)) then
+         if (size(row) == size(self%row)) self%early%goes_on = all(row == self%row)
+      end if
+      self%early%is_made = .false.
+      if (self%early%goes_on) then
+         call go_on(self, newton)
+         return
+      end if
       newton%n_solve = 0
       n_slip = max(0, maxval(set%slip(:set%n_row)))
       self%turns = n_slip > 1 .and. any(self%law%mu > 0.0_wp)
-      row = names_of(set)
       self%has_tangent = self%has_tangent .and. self%turns .and. .not. any(abs(newton%driven) &
          > 0.0_wp)
       if (self%has_tangent) self%has_tangent = size(row) == size(self%row)
@@ -155,10 +177,33 @@ contains
          allocate(self%status(size(law)))
       end associate
       self%rest = rest_t()
+      self%step%mixes = .false.
       self%least_soft = 0
       self%is_rounding = .false.
       self%is_condensed = self%has_tangent
    end subroutine begin
+
+   !> From where the last solve ended early; where friction is led elsewhere since then forces may
+   !> have far to go.
+   pure subroutine go_on(self, newton)
+      type(contact_newton_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      logical :: is_led_anew
+      integer :: k
+
+      is_led_anew = .false.
+      associate (target => self%problem%slip_target)
+         do k = 1, size(self%law)
+            is_led_anew = is_led_anew .or. any(abs(self%law(k)%slip_target(:size(target, 1)) &
+               - target(:, k)) > 0.0_wp)
+            target(:, k) = self%law(k)%slip_target(:size(target, 1))
+         end do
+      end associate
+      if (.not. is_led_anew) return
+      self%step%mixes = .false.
+      self%rest = rest_t()
+      newton%n_solve = 0
+   end subroutine go_on
 
    !> Numbers that tell the rows of sets apart.
    pure function names_of(set) result(row)
@@ -181,8 +226,7 @@ contains
       self%problem%mu = self%law%mu
       if (allocated(self%condensation%hold)) deallocate(self%condensation%hold)
       allocate(self%condensation%hold(set%n_row), source=0.0_wp)
-      if (allocated(self%old)) deallocate(self%old, self%new)
-      allocate(self%old(set%n_row), self%new(set%n_row))
+      call mixed_step_begin(self%step, set%n_row)
    end subroutine begin_anew
 
    subroutine iterate(self, newton, system, set, motion, status, error)
@@ -197,7 +241,7 @@ contains
 
       most_iterates = more_iterates*newton%convergence%maximum
       self%is_driven = any(abs(newton%driven) > 0.0_wp)
-      self%by_kept = may_keep(self, newton, system, set)
+      if (.not. self%early%goes_on) self%by_kept = may_keep(self, newton, system, set)
       if (self%is_driven) motion%du = motion%du - newton%driven
       do i = 0, most_iterates
          call newton_check_interrupt(newton, status, error)
@@ -209,6 +253,10 @@ contains
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
+         self%early%is_made = self%early%is_allowed .and. i > 0 &
+            .and. self%rest%size <= early_enough
+         if (self%early%is_made) status = newton_early
+         if (self%early%is_made) return
          if (i == most_iterates .and. self%rest%size <= newton%convergence%tolerance) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%rest%size < huge(self%rest%size)) return
@@ -220,7 +268,8 @@ contains
             status = newton_early
             return
          end if
-         if (i > 0 .and. .not. self%is_driven .and. self%rest%size > no_search) then
+         if ((i > 0 .or. self%early%goes_on) .and. .not. self%is_driven &
+            .and. self%rest%size > no_search) then
             call search(self, newton, system, set, motion, error)
          else
             call take(self, newton, system, set, motion, 1.0_wp)
@@ -238,8 +287,9 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
 
-      may_keep = factor_policy_may_provide(newton%factor_policy) .and. &
-         .not. (self%holds .or. self%is_driven .or. self%has_tangent)
+      may_keep = (self%turns .or. set%n_row >= many) &
+         .and. factor_policy_may_provide(newton%factor_policy) &
+         .and. .not. (self%holds .or. self%is_driven .or. self%has_tangent)
       if (may_keep) may_keep = kept_factor_has_room(newton%correction%kept, set%n_row, &
          size(system%matrix%column))
    end function may_keep
@@ -518,6 +568,11 @@ contains
       type(newton_t), intent(in) :: newton
 
       keeps = self%is_condensed .and. .not. self%condensation%is_singular
+      if (self%step%mixes .and. self%by_kept) then
+         ! Mixing sees what is wrong with it.
+         keeps = keeps .and. self%rest%size < enough_by_kept*self%rest%last
+         return
+      end if
       if (keeps) keeps = (self%rest%size <= newton%convergence%tolerance .and. .not. self%by_kept) &
          .or. ((self%turns .or. self%by_kept) .and. self%rest%size < enough_kept*self%rest%last)
    end function does_keep_tangent
@@ -602,21 +657,36 @@ contains
       real(wp) :: more(set%n_row - set%n_permanent), held(set%n_permanent)
       integer :: k
 
-      self%old = set%lam
+      self%step%old = set%lam
       force = contact_problem_force(self%problem, self%push)
       associate (first => set%n_permanent)
          do k = first + 1, set%n_row
-            self%new(k) = force(set%slip(k), set%condition(k) - first)
+            self%step%new(k) = force(set%slip(k), set%condition(k) - first)
             more(k - first) = self%push(set%slip(k), set%condition(k) - first)
          end do
          call condensation_move(self%condensation, newton%correction%kept, more, newton%dq, held, &
             error)
          if (allocated(error)) return
-         self%new(:first) = self%old(:first) + held
+         self%step%new(:first) = self%step%old(:first) + held
       end associate
+      call mix(self, newton)
       newton%n_solve = newton%n_solve + 1
       system%phases%n_solve = system%phases%n_solve + 1
    end subroutine correct
+
+   !> Near the end what a factor that is kept leaves is mixed, where slip has a direction.
+   subroutine mix(self, newton)
+      type(contact_newton_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      integer :: k
+
+      if (self%turns .and. self%by_kept .and. self%rest%size <= early_enough) then
+         call mixed_step_mix(self%step, maxval([(abs(self%problem%w(k, k)), k = 1, &
+            size(self%problem%w, 1))]), newton%dq)
+      else
+         self%step%mixes = .false.
+      end if
+   end subroutine mix
 
    !> Of parts of the correction take the first that gains, or that which leaves least.
    subroutine search(self, newton, system, set, motion, error)
@@ -652,6 +722,7 @@ contains
          call take(self, newton, system, set, motion, best_part)
       end if
       newton%dq = best_part*newton%dq
+      call mixed_step_shorten(self%step, best_part)
    end subroutine search
 
    !> Go a part of the way to what the condensed step has as its solution.
@@ -664,7 +735,7 @@ contains
       real(wp), intent(in) :: part
 
       call add_to_dofs(system%space%numbering, newton%dq, part, motion%du)
-      set%lam = self%old + part*(self%new - self%old)
+      set%lam = self%step%old + part*(self%step%new - self%step%old)
    end subroutine take
 
 end module emcon_contact_newton

@@ -203,10 +203,11 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: leads
+      logical :: leads, has_looked
       integer :: i
 
       self%friction%follows = .false.
+      has_looked = .not. (self%friction%looks_back .and. self%rules%has_impacts)
       newton%looks_early = .false.
       newton%convergence%largest_move = huge(1.0_wp)
       if (.not. self%rules%has_impacts) newton%convergence%largest_move = self%rules%largest_move
@@ -214,6 +215,7 @@ contains
          call candidates_select(self, system, motion)
          associate (set => self%set)
             solve%holds = self%support%is_needed
+            solve%early%is_allowed = .not. has_looked
             if (allocated(solve%law)) deallocate(solve%law)
             allocate(solve%law(set%n - set%n_permanent))
             if (self%friction%is_on) solve%law &
@@ -231,6 +233,7 @@ contains
             call keep(self, solve%law)
             call candidates_look(self, system, motion, status, .false.)
             if (status /= step_done) return
+            if (.not. has_looked) call look_back_early(self, system, motion, has_looked)
             cycle
          end if
          call keep(self, solve%law)
@@ -249,6 +252,21 @@ contains
       end do
       status = step_cycling
    end subroutine solve_in_rounds
+
+   !> The step is solved to a few digits: what stops or turns back is led to its end from here on.
+   !> `stands`: nothing does, and no candidate joins.
+   subroutine look_back_early(self, system, motion, stands)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: stands
+      logical :: leads
+
+      stands = .not. self%candidates%have_changed
+      if (.not. stands) return
+      call friction_look_back(self%friction, system, self%set, motion, leads, self%candidates%acts)
+      stands = .not. leads
+   end subroutine look_back_early
 
    !> Multipliers and ways of the candidates: what is not open acts.
    subroutine keep(self, law)

@@ -6,9 +6,9 @@
 !> set; in statics trials of single contacts do. Contacts that give way are solved by sets alone.
 !> Source: docs/theory.md, section 6.1.
 module emcon_contact_sets
-   use emcon_active_set, only : active_set_complete, active_set_may_turn, active_set_open_sets, &
-      active_set_repeats, active_set_slides, active_set_t, step_cycling, step_done, step_loose, &
-      step_not_held
+   use emcon_active_set, only : active_set_complete, active_set_may_turn, active_set_mixes, &
+      active_set_open_sets, active_set_repeats, active_set_slides, active_set_t, step_cycling, &
+      step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact_candidates, only : candidates_are_many, &
@@ -292,6 +292,10 @@ contains
       if (goes_on) then
          call choose_by_problem(self, system, newton, motion, turns, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
+         self%is_active = self%candidates%acts
+         ! Where slip has a direction no set says where to while some of it stops.
+         goes_on = .not. (self%friction%looks_back .and. active_set_mixes(self))
+         if (.not. goes_on) return
       else
          goes_on = .not. self%rules%has_impacts .or. are_many .or. &
             active_set_may_turn(self, system)
