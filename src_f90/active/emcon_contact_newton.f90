@@ -6,37 +6,34 @@
 !> the method converges as Newton's does. The end is told by the laws, not by the set: where rows
 !> follow from others motions stand while forces still trade. Source: docs/theory.md, eq. (14i).
 module emcon_contact_newton
-   use emcon_condensation, only : condensation_free, condensation_make, condensation_move, &
-      condensation_renew, condensation_t, condensation_take
+   use emcon_condensation, only : condensation_free
    use emcon_constraint, only : condition_rate, most_slips
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
-   use emcon_contact_parts, only : contact_parts_solve
-   use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_force, contact_problem_status, contact_problem_t
-   use emcon_contact_rest, only : contact_rest_defect, contact_rest_gather, contact_rest_missed
-   use emcon_contact_trials, only : contact_slope_t
+   use emcon_contact_newton_condense, only : contact_newton_condense, &
+      contact_newton_condense_kept, contact_newton_correct
+   use emcon_contact_newton_type, only : contact_newton_t, rest_t
+   use emcon_contact_problem, only : contact_problem_create
+   use emcon_contact_rest, only : contact_rest_defect, contact_rest_missed
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
-   use emcon_coulomb_law, only : coulomb_t, slip_status_t
    use emcon_early_set, only : early_enough
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_is_equilibrium
-   use emcon_factor_policy, only : factor_policy_may_provide, factor_policy_provide
-   use emcon_friction, only : friction_stiffness
-   use emcon_kept_factor, only : kept_factor_has_room, kept_factor_may_condense
+   use emcon_factor_policy, only : factor_policy_may_provide
+   use emcon_kept_factor, only : kept_factor_has_room
    use emcon_kinds, only : wp
    use emcon_lane_sums, only : relative_size
-   use emcon_mixed_step, only : mixed_step_begin, mixed_step_mix, mixed_step_shorten, mixed_step_t
+   use emcon_mixed_step, only : mixed_step_begin, mixed_step_shorten
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
       newton_early, newton_find_idle, newton_measure_forces, newton_pick_residual, newton_refused, &
-      newton_singular, newton_t
+      newton_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, phase_leave
+   use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_tangent_times, system_t
    implicit none
    private
-   public :: contact_newton_t, contact_newton_solve, contact_newton_free
+   public :: contact_newton_t, contact_newton_solve, contact_newton_free, contact_newton_suits
 
    !> Iterates of a solve at most, by those that a set which stands is given; halvings of a
    !> correction that no forces are found after.
@@ -45,14 +42,6 @@ module emcon_contact_newton
    !> and the size below which none is looked for.
    integer, parameter :: most_parts = 4
    real(wp), parameter :: enough = 0.9_wp, no_search = 1.0e-7_wp
-   !> After so many iterates without half of the best size the curvature of contacts is left out of
-   !> the tangent for as many, and so on in turn.
-   integer, parameter :: stall_turn = 7
-   !> After so many the laws are met as they are linearised, however far the forces are that do so.
-   integer, parameter :: exact_turn = 3
-   !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
-   !> by the last ones an iterate goes a part of the way only.
-   real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
    !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
    !> solution for each row; where slip has a direction of any number. And in statics they are stiff
    !> only where nothing else holds a body: without that, pushes are found of rows that follow from
@@ -63,48 +52,6 @@ module emcon_contact_newton
    real(wp), parameter :: enough_kept = 0.1_wp, enough_by_kept = 0.5_wp
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
-
-   !> What is left: relative residual, and what contacts miss.
-   type :: rest_t
-      real(wp) :: size = huge(1.0_wp)            !! of the iterate
-      real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)     !! of the best and the last one
-      integer :: n_stall = 0                     !! iterates since the last clear gain
-   end type rest_t
-
-   !> A solve may end as `newton_early` once forces are met to a few digits, so that its caller sees
-   !> whether this is what is to be solved; the next one goes on from there.
-   type :: early_end_t
-      logical :: is_allowed = .false.            !! before a solve
-      logical, private :: is_made = .false.      !! the last solve ended so
-      logical, private :: goes_on = .false.      !! this one goes on with that
-   end type early_end_t
-
-   !> One solve, or several one after the other for a step.
-   type :: contact_newton_t
-      type(coulomb_t), allocatable :: law(:)     !! (n) of the contacts; mu = 0: no friction
-      !> Before a solve: contact alone holds a body; in it: rows are stiff in the tangent
-      logical :: holds = .false.
-      type(early_end_t) :: early
-      type(condensation_t), private :: condensation
-      type(contact_problem_t), private :: problem
-      type(contact_slope_t), private :: slope    !! of the problem that was solved last
-      integer, allocatable, private :: row(:)    !! what it was condensed for: see `names_of`
-      logical, private :: has_tangent = .false.  !! there is one, of the same rows
-      real(wp), allocatable, private :: push(:, :)       !! (0:n_slip, n) of the condensed contacts
-      !> (n) in which way the law is to hold
-      type(slip_status_t), allocatable, private :: status(:)
-      type(mixed_step_t), private :: step
-      type(rest_t), private :: rest
-      logical, private :: is_rounding = .false.  !! nothing but round-off is left
-      integer, private :: least_soft = 0         !! first of `softer` that is tried, 0: none
-      logical, private :: is_searching = .false. !! no tangent is wanted
-      logical, private :: turns = .false.        !! something rubs, and slip has a direction
-      logical, private :: is_driven = .false.    !! the next correction meets prescribed motion
-      logical, private :: by_kept = .false.      !! corrections come from a factor that is kept
-      logical, private :: is_condensed = .false. !! by that, or by the tangent
-      !> What was condensed last does for the next correction
-      logical, private :: keeps_tangent = .false.
-   end type contact_newton_t
 
 contains
 
@@ -131,6 +78,18 @@ contains
          self%law(k)%status = self%status(k)
       end do
    end subroutine contact_newton_solve
+
+   !> Is a balance without inertia of so many contacts that it is best begun with all of them? Their
+   !> rows often follow from others there, and sets of them are tried in vain, each by a tangent;
+   !> the problem of all is solved by a factor that is kept.
+   pure logical function contact_newton_suits(newton, motion, n_contact) result(suits)
+      type(newton_t), intent(in) :: newton       !! begun
+      type(motion_t), intent(in) :: motion
+      integer, intent(in) :: n_contact           !! that act so far
+
+      suits = evaluation_is_equilibrium(motion%evaluation) .and. n_contact >= many .and. &
+         factor_policy_may_provide(newton%factor_policy)
+   end function contact_newton_suits
 
    !> Free what solvers hold.
    subroutine contact_newton_free(self)
@@ -309,7 +268,8 @@ contains
       is_found = self%by_kept .and. (self%keeps_tangent .or. &
          self%rest%size < enough_by_kept*self%rest%last)
       call count_stall(self)
-      if (is_found) call condense_by_kept(self, newton, system, set, motion, is_found, error)
+      if (is_found) call contact_newton_condense_kept(self, newton, system, set, &
+         motion, is_found, error)
       if (allocated(error)) return
       status = newton_converged
       if (.not. is_found) then
@@ -321,10 +281,10 @@ contains
          call find_tangent(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (self%is_driven) call add_driven(newton, system, set, motion)
-         call condense(self, newton, system, set, status, error)
+         call contact_newton_condense(self, newton, system, set, status, error)
          if (allocated(error) .or. status /= newton_converged) return
       end if
-      call correct(self, newton, system, set, error)
+      call contact_newton_correct(self, newton, system, set, error)
    end subroutine find_correction
 
    !> Let there be a tangent, unless the last one is kept.
@@ -338,8 +298,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       status = newton_converged
-      if (.not. self%is_searching .or. self%keeps_tangent) return
+      if (self%rest%has_second .or. self%keeps_tangent) return
       self%is_searching = .false.
+      self%rest%is_measured = .false.
       call measure(self, newton, system, set, motion, status, error)
    end subroutine find_tangent
 
@@ -387,7 +348,10 @@ contains
       integer :: i
 
       do i = 0, most_halvings
-         call measure(self, newton, system, set, motion, status, error)
+         status = newton_converged
+         if (.not. (self%rest%is_measured .and. self%is_searching)) &
+            call measure(self, newton, system, set, motion, status, error)
+         self%rest%is_measured = .false.
          if (allocated(error) .or. status == newton_converged) exit
          if (newton%n_solve == 0) return
          newton%dq = 0.5_wp*newton%dq
@@ -423,7 +387,8 @@ contains
       status = newton_converged
       call phase_enter(system%phases, phase_gaps, left)
       call constraints_take_hold(set)
-      call constraints_evaluate(set, system, motion, self%is_searching)
+      self%rest%has_second = .not. (self%is_searching .or. self%by_kept)
+      call constraints_evaluate(set, system, motion, .not. self%rest%has_second)
       call constraints_rows(set, system%space%numbering)
       call phase_leave(system%phases, left)
       call newton_pick_residual(newton, system, set)
@@ -457,110 +422,6 @@ contains
       end do
    end subroutine add_driven
 
-   !> The contacts in their multipliers alone, and those that obey the laws there. Where none do the
-   !> curvature of the rows is left out: without it W is that of a body which is pushed.
-   subroutine condense(self, newton, system, set, status, error)
-      type(contact_newton_t), intent(inout) :: self
-      type(newton_t), intent(inout) :: newton
-      type(system_t), intent(inout) :: system
-      type(constraint_set_t), intent(inout) :: set
-      integer, intent(out) :: status             !! one of the `newton_` codes
-      type(error_t), allocatable, intent(out) :: error
-      logical :: is_solved, has_curvature
-      integer :: left, turn
-
-      do turn = 1, 2
-         has_curvature = .not. btest(self%rest%n_stall/stall_turn, 0)
-         call phase_enter(system%phases, phase_factorise, left)
-         if (turn == 1 .and. self%keeps_tangent) then
-            call condensation_renew(self%condensation, set, newton%residual, error)
-            call phase_leave(system%phases, phase_eliminate)
-         else
-            call find_hold(self, system, set)
-            call condensation_make(self%condensation, system, set, newton%correction, &
-               newton%residual, has_curvature, error)
-            call phase_leave(system%phases, phase_eliminate)
-            system%phases%n_factorisation = system%phases%n_factorisation + 1
-            newton%convergence%n_iteration = newton%convergence%n_iteration + 1
-            self%has_tangent = .not. (allocated(error) .or. self%condensation%is_singular)
-            self%is_condensed = self%has_tangent
-         end if
-         status = newton_singular
-         if (allocated(error) .or. self%condensation%is_singular) return
-         call solve_condensed(self, set, newton%n_solve > 0, is_solved)
-         call phase_leave(system%phases, left)
-         if (is_solved .or. .not. has_curvature) exit
-         self%rest%n_stall = stall_turn
-      end do
-      status = merge(newton_converged, newton_diverged, is_solved)
-      if (is_solved) self%status = contact_problem_status(self%problem, self%push)
-   end subroutine condense
-
-   !> The same by a factor that is kept. `is_found`: there is one, and it leads to forces.
-   subroutine condense_by_kept(self, newton, system, set, motion, is_found, error)
-      type(contact_newton_t), intent(inout) :: self
-      type(newton_t), intent(inout) :: newton
-      type(system_t), intent(inout) :: system
-      type(constraint_set_t), intent(in) :: set
-      type(motion_t), intent(in) :: motion
-      logical, intent(out) :: is_found
-      type(error_t), allocatable, intent(out) :: error
-      integer :: left
-
-      call phase_enter(system%phases, phase_factorise, left)
-      is_found = .true.
-      associate (kept => newton%correction%kept)
-         if (.not. kept%is_made) then
-            call factor_policy_provide(newton%factor_policy, newton%correction, system, motion, &
-               error)
-            system%phases%n_factorisation = system%phases%n_factorisation + 1
-         end if
-         call phase_leave(system%phases, phase_eliminate)
-         if (.not. allocated(error)) is_found = kept_factor_may_condense(kept, set%n_row)
-         if (is_found .and. .not. allocated(error)) call condensation_take(self%condensation, &
-            kept, set, newton%residual, .not. self%keeps_tangent, error)
-      end associate
-      is_found = is_found .and. .not. (allocated(error) .or. self%condensation%is_singular)
-      self%is_condensed = is_found
-      if (is_found) then
-         newton%convergence%n_iteration = newton%convergence%n_iteration + 1
-         call find_hold(self, system, set)
-         call solve_condensed(self, set, newton%n_solve > 0, is_found)
-      end if
-      if (is_found) self%status = contact_problem_status(self%problem, self%push)
-      call phase_leave(system%phases, left)
-   end subroutine condense_by_kept
-
-   !> Forces that obey the laws as the step is condensed; softer where there are none. If slip has
-   !> a direction and there was an iterate before they are first looked for near its forces, as long
-   !> as that gains; then every other time far from those, where what follows from others leaves its
-   !> limits.
-   subroutine solve_condensed(self, set, is_near, is_solved)
-      type(contact_newton_t), intent(inout) :: self
-      type(constraint_set_t), intent(in) :: set
-      logical, intent(in) :: is_near             !! there was an iterate before
-      logical, intent(out) :: is_solved
-      type(contact_effort_t) :: effort
-      integer :: level
-
-      if (self%turns .and. is_near .and. .not. btest(self%rest%n_stall, 0)) then
-         call lay_out(self, set)
-         self%push = 0.0_wp
-         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true., self%slope, &
-            .true.)
-         if (is_solved) return
-      end if
-      do level = self%least_soft, size(softer)
-         call lay_out(self, set)
-         self%push = 0.0_wp
-         if (level > 0) call soften(self, softer(level))
-         call contact_parts_solve(self%problem, self%push, effort, is_solved, level > 0 .or. &
-            self%rest%n_stall < exact_turn, self%slope)
-         if (is_solved) exit
-      end do
-      self%least_soft = min(level, 1)
-   end subroutine solve_condensed
-
    !> Does the last tangent do for what is left? It does within the tolerance; and where slip has a
    !> direction, which needs a motion by each row, as long as it gains as much as there is to gain.
    pure logical function does_keep_tangent(self, newton) result(keeps)
@@ -576,117 +437,6 @@ contains
       if (keeps) keeps = (self%rest%size <= newton%convergence%tolerance .and. .not. self%by_kept) &
          .or. ((self%turns .or. self%by_kept) .and. self%rest%size < enough_kept*self%rest%last)
    end function does_keep_tangent
-
-   !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
-   pure subroutine find_hold(self, system, set)
-      type(contact_newton_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(in) :: set
-      integer :: k
-
-      associate (problem => self%problem, first => set%n_permanent)
-         do k = 1, size(problem%stiffness)
-            problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
-         end do
-         if (.not. self%holds) return
-         do k = first + 1, set%n_row
-            self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
-         end do
-      end associate
-   end subroutine find_hold
-
-   !> The problem of the contacts as it was condensed. Without friction a contact has no slips to
-   !> solve for: any one by itself.
-   subroutine lay_out(self, set)
-      type(contact_newton_t), intent(inout) :: self
-      type(constraint_set_t), intent(in) :: set
-      integer :: k, i, m, place(set%n_row - set%n_permanent)
-
-      m = 1 + self%problem%n_slip
-      associate (problem => self%problem, first => set%n_permanent, w => self%condensation%w)
-         problem%w = 0.0_wp
-         problem%free = 0.0_wp
-         call contact_rest_gather(set, set%lam, problem%base)
-         call contact_rest_gather(set, self%condensation%hold, problem%hold)
-         call contact_rest_gather(set, set%defect, problem%start)
-         problem%start(1:, :) = problem%start(1:, :) - problem%slip_target
-         place = m*(set%condition(first + 1:) - first - 1) + 1 + set%slip(first + 1:)
-         do k = 1, size(w, 1)
-            problem%w(place, place(k)) = w(:, k)
-            problem%free(set%slip(first + k), set%condition(first + k) - first) &
-               = self%condensation%free(k)
-         end do
-         problem%free(1:, :) = problem%free(1:, :) - problem%slip_target
-         do k = 1, size(self%status)
-            associate (item => set%item(first + k), at => m*(k - 1) + 1)
-               problem%mu(k) = self%law(k)%mu*item%normal
-               do i = 1, merge(0, m - 1, item%has_friction)
-                  problem%w(at + i, at + i) = problem%w(at, at)
-                  problem%free(i, k) = 0.0_wp
-                  problem%start(i, k) = 0.0_wp
-               end do
-            end associate
-         end do
-      end associate
-   end subroutine lay_out
-
-   !> Each row gives way by this part of its own W about the forces of the iterate before: what has
-   !> no solution as it is linearised comes nearer by it, and where forces stand it changes nothing.
-   pure subroutine soften(self, part)
-      type(contact_newton_t), intent(inout) :: self
-      real(wp), intent(in) :: part
-      integer :: i, k, row
-
-      do k = 1, size(self%status)
-         do i = 0, self%problem%n_slip
-            row = (1 + self%problem%n_slip)*(k - 1) + 1 + i
-            self%problem%w(row, row) = self%problem%w(row, row) &
-               + part*abs(self%problem%w(row, row))
-         end do
-      end do
-   end subroutine soften
-
-   !> The correction of the unknowns, and the multipliers after it.
-   subroutine correct(self, newton, system, set, error)
-      type(contact_newton_t), intent(inout) :: self
-      type(newton_t), intent(inout) :: newton
-      type(system_t), intent(inout) :: system
-      type(constraint_set_t), intent(in) :: set
-      type(error_t), allocatable, intent(out) :: error
-      real(wp), dimension(0:self%problem%n_slip, size(self%status)) :: force
-      real(wp) :: more(set%n_row - set%n_permanent), held(set%n_permanent)
-      integer :: k
-
-      self%step%old = set%lam
-      force = contact_problem_force(self%problem, self%push)
-      associate (first => set%n_permanent)
-         do k = first + 1, set%n_row
-            self%step%new(k) = force(set%slip(k), set%condition(k) - first)
-            more(k - first) = self%push(set%slip(k), set%condition(k) - first)
-         end do
-         call condensation_move(self%condensation, newton%correction%kept, more, newton%dq, held, &
-            error)
-         if (allocated(error)) return
-         self%step%new(:first) = self%step%old(:first) + held
-      end associate
-      call mix(self, newton)
-      newton%n_solve = newton%n_solve + 1
-      system%phases%n_solve = system%phases%n_solve + 1
-   end subroutine correct
-
-   !> Near the end what a factor that is kept leaves is mixed, where slip has a direction.
-   subroutine mix(self, newton)
-      type(contact_newton_t), intent(inout) :: self
-      type(newton_t), intent(inout) :: newton
-      integer :: k
-
-      if (self%turns .and. self%by_kept .and. self%rest%size <= early_enough) then
-         call mixed_step_mix(self%step, maxval([(abs(self%problem%w(k, k)), k = 1, &
-            size(self%problem%w, 1))]), newton%dq)
-      else
-         self%step%mixes = .false.
-      end if
-   end subroutine mix
 
    !> Of parts of the correction take the first that gains, or that which leaves least.
    subroutine search(self, newton, system, set, motion, error)
@@ -710,6 +460,7 @@ contains
          call take(self, newton, system, set, motion, part)
          call measure(self, newton, system, set, motion, status, error)
          if (allocated(error)) return
+         self%rest%is_measured = status == newton_converged
          if (self%rest%size < least) then
             least = self%rest%size
             best_part = part
@@ -720,6 +471,7 @@ contains
       if (abs(part - best_part) > 0.0_wp) then
          motion%du = start
          call take(self, newton, system, set, motion, best_part)
+         self%rest%is_measured = .false.
       end if
       newton%dq = best_part*newton%dq
       call mixed_step_shorten(self%step, best_part)

@@ -9,7 +9,8 @@ module emcon_contact_rounds
    use emcon_contact_candidates, only : candidates_are_many, &
       candidates_are_too_many, candidates_keep_forces, candidates_look, candidates_select
    use emcon_contact_conditions, only : gap_noise
-   use emcon_contact_newton, only : contact_newton_free, contact_newton_solve, contact_newton_t
+   use emcon_contact_newton, only : contact_newton_free, contact_newton_solve, &
+      contact_newton_suits, contact_newton_t
    use emcon_contact_sets, only : contact_sets_begin_anew, contact_sets_hold, contact_sets_solve, &
       contact_sets_solve_by_laws
    use emcon_contact_support, only : contact_support_forget
@@ -52,7 +53,8 @@ contains
          call contact_sets_solve_by_laws(self, system, newton, motion, status, error)
          return
       end if
-      if (turns(self, system)) then
+      if (turns(self, system) .or. (.not. self%support%is_needed .and. &
+         contact_newton_suits(newton, motion, count(self%candidates%began)))) then
          call begin_again(self, system, motion)
          call solve_with_all(self, system, newton, motion, status, error)
          if (status == step_done .or. allocated(error)) return
