@@ -5,7 +5,7 @@
 !> section 6.1.
 module emcon_contact_candidates
    use emcon_active_set, only : active_set_note_stale, active_set_pass, active_set_select, &
-      active_set_t, active_set_update_gaps, step_done, step_too_far, touch_tol
+      active_set_slides, active_set_t, active_set_update_gaps, step_done, step_too_far, touch_tol
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate
    use emcon_contact, only : contact_t
@@ -135,7 +135,9 @@ contains
       end do
       self%candidates%acted(:) = self%candidates%acts
       call phase_leave(system%phases, left)
-      call newton_solve(newton, system, self%set, motion, status, error)
+      ! Where friction turns too much for a factor that is kept, the problem of all candidates follows.
+      call newton_solve(newton, system, self%set, motion, status, error, &
+         .not. (self%friction%follows .and. active_set_slides(self)))
       self%n_newton = self%n_newton + newton%convergence%n_iteration
    end subroutine candidates_solve
 

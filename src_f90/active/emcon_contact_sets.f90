@@ -83,7 +83,8 @@ contains
             return
          end if
          self%guess%before = motion%du
-         call solve_set(self, system, newton, motion, status, error)
+         newton%looks_early = self%candidates%is_new_set .and. .not. self%support%is_needed
+         call candidates_solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
          ! Rows that lose their rank on the way are those of a motion that goes astray.
          if (status == newton_redundant .and. (newton%convergence%n_iteration == 0 .or. &
@@ -114,22 +115,6 @@ contains
          if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine contact_sets_solve
-
-   !> Solve with the present set. Where friction turns too much for a factor that is kept, the
-   !> problem of all candidates follows it, and no tangents are made.
-   subroutine solve_set(self, system, newton, motion, status, error)
-      type(active_set_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
-      type(newton_t), intent(inout) :: newton
-      type(motion_t), intent(inout) :: motion
-      integer, intent(out) :: status             !! one of the `newton_` codes
-      type(error_t), allocatable, intent(out) :: error
-
-      newton%looks_early = self%candidates%is_new_set .and. .not. self%support%is_needed
-      newton%factor_policy%is_alone = self%friction%follows .and. active_set_slides(self)
-      call candidates_solve(self, system, newton, motion, status, error)
-      newton%factor_policy%is_alone = .false.
-   end subroutine solve_set
 
    !> Of so many candidates, or by iterations, nothing but trials names sets.
    pure logical function needs_trials(self, newton)

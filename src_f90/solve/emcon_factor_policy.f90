@@ -36,7 +36,6 @@ module emcon_factor_policy
    type :: factor_policy_t
       logical :: is_wanted = .true.              !! in steps that it may serve
       logical :: is_allowed = .false.            !! in the present step
-      logical :: is_alone = .false.              !! no tangents follow where it does not serve
       type(factor_base_t) :: base                !! of the present factor
       logical, private :: is_tried = .false.     !! in the present step
       logical, private :: iterates_no_more = .false. !! iterations have led nowhere: see the base

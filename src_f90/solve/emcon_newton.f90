@@ -110,14 +110,15 @@ contains
 
    !> Solve for `motion%du`, whose prescribed entries stand; on entry a first guess. The multipliers
    !> of `set` start from what they are. By a kept factor where that leads to the end, else by
-   !> tangents, unless its policy is to make none.
-   subroutine newton_solve(self, system, set, motion, status, error)
+   !> tangents, if it takes any.
+   subroutine newton_solve(self, system, set, motion, status, error, takes_tangents)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
+      logical, intent(in), optional :: takes_tangents    !! .true. if it is not given
       real(wp), allocatable :: lam(:)
       logical :: is_done, goes_on
 
@@ -136,8 +137,10 @@ contains
          if (is_done .or. allocated(error)) return
          if (set%n > 0) set%lam = lam
       end if
-      status = newton_diverged
-      if (self%factor_policy%is_alone) return
+      if (present(takes_tangents)) then
+         status = newton_diverged
+         if (.not. takes_tangents) return
+      end if
       call solve_by_tangents(self, system, set, motion, status, error)
    end subroutine newton_solve
 
