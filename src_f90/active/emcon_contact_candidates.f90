@@ -135,7 +135,7 @@ contains
       end do
       self%candidates%acted(:) = self%candidates%acts
       call phase_leave(system%phases, left)
-      ! Where friction turns too much for a factor that is kept, the problem of all candidates follows.
+      ! Where friction turns too much for a factor that is kept, the problem of all follows.
       call newton_solve(newton, system, self%set, motion, status, error, &
          .not. (self%friction%follows .and. active_set_slides(self)))
       self%n_newton = self%n_newton + newton%convergence%n_iteration
