@@ -235,7 +235,7 @@ contains
             call keep(self, solve%law)
             call candidates_look(self, system, motion, status, .false.)
             if (status /= step_done) return
-            if (.not. has_looked) call look_back_early(self, system, motion, has_looked)
+            has_looked = has_looked .or. .not. self%candidates%have_changed
             cycle
          end if
          call keep(self, solve%law)
@@ -254,21 +254,6 @@ contains
       end do
       status = step_cycling
    end subroutine solve_in_rounds
-
-   !> The step is solved to a few digits: what stops or turns back is led to its end from here on.
-   !> `stands`: nothing does, and no candidate joins.
-   subroutine look_back_early(self, system, motion, stands)
-      type(active_set_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
-      type(motion_t), intent(in) :: motion
-      logical, intent(out) :: stands
-      logical :: leads
-
-      stands = .not. self%candidates%have_changed
-      if (.not. stands) return
-      call friction_look_back(self%friction, system, self%set, motion, leads, self%candidates%acts)
-      stands = .not. leads
-   end subroutine look_back_early
 
    !> Multipliers and ways of the candidates: what is not open acts.
    subroutine keep(self, law)

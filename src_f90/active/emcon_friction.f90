@@ -171,14 +171,12 @@ contains
    !> to be against the slip of the whole step, not that of its end. Those that a solved step stops
    !> or turns back are, and it is to be solved again; but of nodes of rigid bodies, whose slips
    !> over a step disagree by the square of its turn, by the jump of velocities that ends the step.
-   !> Before it is solved to the end the rows of all candidates are there, of which some act.
-   subroutine friction_look_back(self, system, set, motion, leads, acts)
+   subroutine friction_look_back(self, system, set, motion, leads)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: leads              !! it is to be solved again
-      logical, intent(in), optional :: acts(:)   !! (n_constraint) it is solved to a few digits
       real(wp) :: du(size(motion%du, 1), size(motion%du, 2)), to_stop(most_slips)
       logical :: is_bound(size(motion%du, 2)), takes_jumps, by_jump
       integer :: i, k, pair
@@ -189,11 +187,6 @@ contains
       call friction_find_bound(system, set, is_bound)
       du = evaluation_displacement(motion%evaluation, motion%v0, 0.0_wp)
       do k = set%n_permanent + 1, set%n
-         by_jump = takes_jumps .and. all(is_bound(set%item(k)%node(:set%item(k)%n_node)))
-         if (present(acts)) then
-            ! What a jump stops is told by the end of the step.
-            if (by_jump .or. .not. acts(set%id(k))) cycle
-         end if
          call constraint_index(system, set%id(k), pair, i)
          associate (contact => system%contact(pair)%contact, law => self%law(set%id(k)), &
                slip => set%item(k)%slip)
@@ -204,6 +197,7 @@ contains
             if (.not. law%holds_slip() .and. dot_product(slip - to_stop, slip) > 0.0_wp) cycle
             call law%leads_to(to_stop(:self%n_slip), slip_rounding*contact%state(i)%size)
             if (.not. any(abs(law%slip_target) > 0.0_wp)) cycle
+            by_jump = takes_jumps .and. all(is_bound(set%item(k)%node(:set%item(k)%n_node)))
             if (by_jump) law%slip_target = 0.0_wp
             self%stops = self%stops .or. by_jump
             leads = leads .or. .not. by_jump

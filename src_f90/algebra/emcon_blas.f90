@@ -6,6 +6,7 @@ module emcon_blas
    implicit none
    private
    public :: blas_single_thread, blas_is_shareable, blas_name, blas_enter, blas_leave
+   public :: blas_enter_alone, blas_leave_alone
    public :: ieee_status_type
 
    interface
@@ -13,6 +14,10 @@ module emcon_blas
          import :: c_int
          integer(c_int), value :: n
       end function emcon_blas_set_threads
+
+      integer(c_int) function emcon_blas_get_threads() bind(c)
+         import :: c_int
+      end function emcon_blas_get_threads
 
       subroutine emcon_blas_name(n, name) bind(c)
          import :: c_char, c_int
@@ -66,5 +71,27 @@ contains
 
       call ieee_set_status(status)
    end subroutine blas_leave
+
+   !> `blas_enter` for calls whose bits are to be the same however many threads a host has given the
+   !> library: they have one.
+   subroutine blas_enter_alone(status, n_thread)
+      type(ieee_status_type), intent(out) :: status     !! both to be given to `blas_leave_alone`
+      integer, intent(out) :: n_thread           !! that the library has
+      logical :: done
+
+      n_thread = int(emcon_blas_get_threads())
+      if (n_thread > 1) call blas_single_thread(done)
+      call blas_enter(status)
+   end subroutine blas_enter_alone
+
+   !> After these calls: threads, flags and halting as they were.
+   subroutine blas_leave_alone(status, n_thread)
+      type(ieee_status_type), intent(in) :: status
+      integer, intent(in) :: n_thread            !! that the library had, >= 1
+      integer(c_int) :: done
+
+      call blas_leave(status)
+      if (n_thread > 1) done = emcon_blas_set_threads(int(n_thread, c_int))
+   end subroutine blas_leave_alone
 
 end module emcon_blas

@@ -15,6 +15,14 @@ int emcon_blas_set_threads(int n)
    return 1;
 }
 
+/* How many threads it runs; 1 of other libraries. */
+int emcon_blas_get_threads(void)
+{
+   int (*get_threads)(void);
+   *(void **)(&get_threads) = dlsym(RTLD_DEFAULT, "openblas_get_num_threads");
+   return get_threads == NULL ? 1 : get_threads();
+}
+
 /* What OpenBLAS says of itself, the kernels that it chose for this processor among it; "" of other
    libraries. At most n - 1 letters and a zero. */
 void emcon_blas_name(int n, char *name)

@@ -5,7 +5,7 @@ module emcon_supernodal_double
    use, intrinsic :: iso_fortran_env, only : kp => real64
    use, intrinsic :: ieee_arithmetic, only : ieee_get_underflow_mode, ieee_set_underflow_mode, &
       ieee_support_underflow_control
-   use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
+   use emcon_blas, only : blas_enter_alone, blas_leave_alone, ieee_status_type
    use emcon_blocks_lapack, only : dgemm, dtrmm, potrf => dpotrf, syrk => dsyrk, &
       trsm => dtrsm, trtri => dtrtri
    use emcon_csr, only : csr_t

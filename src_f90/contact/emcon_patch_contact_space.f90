@@ -14,7 +14,6 @@ module emcon_patch_contact_space
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
-   use emcon_frame_vertex_space, only : frame_places
    use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       interaction_reach, pair_has_order
@@ -23,16 +22,15 @@ module emcon_patch_contact_space
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t
-   use emcon_patch_look_space, only : patch_look, patch_look_t, patch_shares, place_vertices
-   use emcon_patch_moments_space, only : patch_moments
+   use emcon_patch_look_space, only : patch_look, patch_look_t, patch_shares
+   use emcon_patch_meeting_space, only : least_cover, patch_meets
    use emcon_patch_near_space, only : patch_scope_t
-   use emcon_patch_sides_space, only : flip_signs, frame_normal, point_frames_init, patch_sides_t, &
+   use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
       patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_height, patch_stencil_t
-   use emcon_polygon_clip_space, only : barycentric
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
@@ -42,11 +40,6 @@ module emcon_patch_contact_space
    private
    public :: patch_contact_t, patch_contact_init
 
-   !> A node is let go where less than this part of its patch is covered.
-   real(wp), parameter :: least_cover = 0.02_wp
-   !> At an outline of its side it is held if as much of the way to the middle of the faces there is
-   !> over the surface itself.
-   real(wp), parameter :: least_way = 1.0e-3_wp
    !> Less is round-off.
    real(wp), parameter :: no_cover = 1.0e3_wp*epsilon(1.0_wp)
    !> So far, per facet, a gap may be closed as a step begins in which it begins to act: corners are
@@ -343,7 +336,8 @@ contains
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
          if (state%is_over .and. .not. self%step%has_compliance) state%is_over = &
-            meets(self, i, x + u0, at) .or. meets(self, i, x + u0 + du, at + way)
+            patch_meets(stencil, self%sides%frames, self%frame(i), at, x, u0) .or. &
+            patch_meets(stencil, self%sides%frames, self%frame(i), at + way, x, u0, du)
          state%is_arriving = cover(0) < least
          state%is_covered = look%way <= self%chosen_reach
          state%gap1 = self%step%engages             ! what is not covered asks for nothing
@@ -364,82 +358,6 @@ contains
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
       end associate
    end subroutine measure_frame
-
-   !> Do the faces about the node of frame `i` come over the surface itself, not past its end over
-   !> the flange? If the node is inside of them a part of its patch does, at their outline something
-   !> of the way to their middle.
-   pure logical function meets(self, i, y, at)
-      type(patch_contact_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: y(:, :)    !! (3, n_node) where nodes are [L]
-      real(wp), intent(in) :: at(:, :)           !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      real(wp) :: place(3, self%stencil(i)%patch%n_vertex), middle(2), cover, way
-      integer :: k
-
-      associate (patch => self%stencil(i)%patch, point => self%stencil(i)%point)
-         meets = all(point(:patch%n_vertex) > 0)
-         if (meets) return
-         call place_vertices(patch, at, place)
-         middle = middle_of_faces(self, i, y, at)
-         cover = 0.0_wp
-         way = 0.0_wp
-         do k = 1, patch%n_triangle
-            associate (t => patch%triangle(:, k), start => spread(patch%area%centre, 1, 2))
-               if (any(point(t) <= 0)) cycle
-               cover = cover + sum(patch_moments(patch%area, place(:2, t)))
-               way = way + way_inside(barycentric(place(:2, t), start), &
-                  barycentric(place(:2, t), middle))
-            end associate
-         end do
-         if (maxval(abs(middle - patch%area%centre)) > 0.5_wp) then
-            meets = way > least_way
-         else
-            meets = cover >= least_cover
-         end if
-      end associate
-   end function meets
-
-   !> The middle of the faces about the node of frame `i`, in the coordinates of its patch.
-   pure function middle_of_faces(self, i, y, at) result(middle)
-      type(patch_contact_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: y(:, :)
-      real(wp), intent(in) :: at(:, :)
-      real(wp) :: middle(2), mean(3, 1), place(3, 1)
-      integer :: k
-
-      associate (frames => self%sides%frames, frame => self%frame(i), &
-            patch => self%stencil(i)%patch)
-         middle = patch%area%centre
-         if (frames%point(frame) > frames%n_node) return
-         mean = 0.0_wp
-         associate (first => frames%ring_start(frame), last => frames%ring_start(frame + 1) - 1)
-            do k = first, last
-               mean(:, 1) = mean(:, 1) + flip_signs(frames%flip(k)) &
-                  *(y(:, frames%ring(k)) - y(:, frames%base(frames%point(frame))))
-            end do
-            mean = mean/real(last - first + 1, wp)
-         end associate
-         call frame_places(at(:, 2) - at(:, 1), at(:, 3) - at(:, 1), mean, place)
-         middle = middle + place(:2, 1)/patch%length
-      end associate
-   end function middle_of_faces
-
-   !> The part of a way that is inside of a triangle, or on a side of it.
-   pure real(wp) function way_inside(from, to)
-      real(wp), intent(in) :: from(3), to(3)     !! barycentric coordinates of its ends
-      real(wp) :: first, last
-      integer :: k
-
-      first = 0.0_wp
-      last = 1.0_wp
-      do k = 1, 3
-         if (max(from(k), to(k)) < 0.0_wp) last = 0.0_wp
-         if (from(k) < 0.0_wp .and. to(k) >= 0.0_wp) first = max(first, from(k)/(from(k) - to(k)))
-         if (from(k) >= 0.0_wp .and. to(k) < 0.0_wp) last = min(last, from(k)/(from(k) - to(k)))
-      end do
-      way_inside = max(0.0_wp, last - first)
-   end function way_inside
 
    pure subroutine patch_evaluate(self, wanted, x, u0, du, target, item)
       class(patch_contact_t), intent(inout) :: self

@@ -36,6 +36,7 @@ contains
       type(flexibility_t) :: flexibility
       real(wp) :: limit(most_contacts)
       integer :: list(most_contacts), n, worst, pair, i
+      character(len=:), allocatable :: what
 
       if (.not. march%active%friction%is_on &
          .or. evaluation_is_equilibrium(march%motion%evaluation)) return
@@ -51,21 +52,15 @@ contains
          worst = maxloc(law(id)%mu/limit(:n), 1)
          if (.not. law(id(worst))%mu > limit(worst)) return
          call constraint_index(march%system, id(worst), pair, i)
-         call note_add(increment%notes, coefficient_text(law(id(worst))%mu) // " is above " &
-            // to_text(limit(worst), 4) // ": in an increment the contact of slave node " &
+         what = "the coefficient of friction " // to_text(law(id(worst))%mu)
+         ! As decks have it: what is rough has none.
+         if (law(id(worst))%mu >= sqrt(huge(1.0_wp))) what = "friction that is ROUGH"
+         call note_add(increment%notes, what // " is above " // to_text(limit(worst), 4) &
+            // ": in an increment the contact of slave node " &
             // to_text(scene%node%label(march%system%contact(pair)%contact%node(i))) &
             // " may have several solutions")
       end associate
    end subroutine friction_limit_tell
-
-   !> The coefficient as decks have it: what is rough has none.
-   pure function coefficient_text(mu) result(text)
-      real(wp), intent(in) :: mu                 !! > 0
-      character(len=:), allocatable :: text
-
-      text = "the coefficient of friction " // to_text(mu)
-      if (mu >= sqrt(huge(mu))) text = "friction that is ROUGH"
-   end function coefficient_text
 
    !> What is pushed most of the pairs that rub for the first time, which they have done from here
    !> on.

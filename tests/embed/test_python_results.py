@@ -366,7 +366,7 @@ def test_summary_does_without_the_history_file(run: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
     locate(run).history.unlink()
     assert main(["summary", str(run)]) == 0
-    assert "masses of the bodies are not" in capsys.readouterr().out
+    assert "masses are not in the history" in capsys.readouterr().out
 
 
 # --- bad input ---------------------------------------------------------------------------------
