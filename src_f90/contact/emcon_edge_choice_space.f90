@@ -233,13 +233,14 @@ contains
       integer, intent(in) :: i                   !! 1 to the number of slaves
       type(edge_stencil_t), intent(in) :: crossing
       type(edge_stencil_t) :: new, old
-      integer :: k, n, home
+      integer :: k, n, home, before
 
+      before = places_before(self, i)
       n = merge(n_class, n_guard_class, i <= self%n_sharp)
       home = self%class(crossing%master) - 1
       new = crossing
       do k = home, home + n - 1
-         associate (place => self%stencil(places_before(self, i) + 1 + mod(k, n)))
+         associate (place => self%stencil(before + 1 + mod(k, n)))
             old = place
             if (old%master > 0) then
                if (.not. comes_first(new, old)) cycle

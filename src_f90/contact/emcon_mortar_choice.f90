@@ -239,18 +239,17 @@ contains
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       real(wp) :: width(2)
-      integer :: side
+      integer :: side, beside(size(width))
 
       width = 0.0_wp
-      associate (beside => [master%neighbour(previous, e), master%neighbour(next, e)])
-         do side = 1, 2
-            if (beside(side) == 0) cycle
-            associate (a => master%facet(side, e), b => master%facet(3 - side, beside(side)))
-               if (a /= b) width(side) = norm2((x(:, b) - x(:, a)) + (u0(:, b) - u0(:, a))) &
-                  /master%size(e)
-            end associate
-         end do
-      end associate
+      beside = [master%neighbour(previous, e), master%neighbour(next, e)]
+      do side = 1, 2
+         if (beside(side) == 0) cycle
+         associate (a => master%facet(side, e), b => master%facet(3 - side, beside(side)))
+            if (a /= b) width(side) = norm2((x(:, b) - x(:, a)) + (u0(:, b) - u0(:, a))) &
+               /master%size(e)
+         end associate
+      end do
    end function seam_width
 
 end module emcon_mortar_choice

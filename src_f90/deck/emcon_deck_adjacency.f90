@@ -53,22 +53,22 @@ contains
       integer, intent(in) :: element, face
       integer :: i, k, other
       logical :: has_all
+      integer, allocatable :: node(:)
 
       n_neighbours = 0
       associate (kind => scene%element%kinds(scene%element%kind(element)))
-         associate (node => scene%element%node(kind%face(face), element))
-            if (node(1) == 0) return
-            do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
-               other = adjacency%element(i)
-               if (other == element) cycle
-               has_all = .true.
-               do k = 2, size(node)
-                  has_all = has_all .and. any(scene%element%node(:, other) == node(k))
-               end do
-               if (has_all) n_neighbours = n_neighbours + 1
-            end do
-         end associate
+         node = scene%element%node(kind%face(face), element)
       end associate
+      if (node(1) == 0) return
+      do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
+         other = adjacency%element(i)
+         if (other == element) cycle
+         has_all = .true.
+         do k = 2, size(node)
+            has_all = has_all .and. any(scene%element%node(:, other) == node(k))
+         end do
+         if (has_all) n_neighbours = n_neighbours + 1
+      end do
    end function n_neighbours
 
    !> The elements that have a face between two nodes: how many, and the last of them.
@@ -77,6 +77,7 @@ contains
       type(adjacency_t), intent(in) :: adjacency
       integer, intent(in) :: node(2)
       integer, intent(out) :: n_element, element, face
+      integer, allocatable :: own(:)
       integer :: i, k
 
       n_element = 0
@@ -85,10 +86,8 @@ contains
       do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
          associate (e => adjacency%element(i))
             do k = 1, scene%element%kinds(scene%element%kind(e))%n_face
-               associate (own => &
-                  scene%element%node(scene%element%kinds(scene%element%kind(e))%face(k), e))
-                  if (any(own(:2) /= node) .and. any(own(2:1:-1) /= node)) cycle
-               end associate
+               own = scene%element%node(scene%element%kinds(scene%element%kind(e))%face(k), e)
+               if (any(own(:2) /= node) .and. any(own(2:1:-1) /= node)) cycle
                n_element = n_element + 1
                element = e
                face = k

@@ -76,16 +76,16 @@ contains
       real(wp), intent(out) :: along             !! the side
       real(wp), intent(out) :: beside            !! in any direction
       real(wp) :: chord(2), arm(2), part
+      integer, allocatable :: node(:)
       integer :: f
 
       along = 0.0_wp
       beside = 0.0_wp
       associate (kind => scene%element%kinds(scene%element%kind(e)))
          do f = 1, kind%n_face
-            associate (node => scene%element%node(kind%face(f), e))
-               chord = scene%x(:, node(2)) - scene%x(:, node(1))
-               arm = scene%x(:, node(3)) - scene%x(:, node(1))
-            end associate
+            node = scene%element%node(kind%face(f), e)
+            chord = scene%x(:, node(2)) - scene%x(:, node(1))
+            arm = scene%x(:, node(3)) - scene%x(:, node(1))
             arm = arm/maxval(abs(chord))
             chord = chord/maxval(abs(chord))
             part = dot_product(arm, chord)/dot_product(chord, chord)
@@ -125,6 +125,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       type(adjacency_t) :: adjacency
+      integer, allocatable :: side(:)
       integer :: e, f, g, i, other
 
       call adjacency_init(adjacency, scene)
@@ -132,20 +133,19 @@ contains
          associate (kind => scene%element%kinds(scene%element%kind(e)))
             if (kind%n_face_node /= 2) cycle
             do f = 1, kind%n_face
-               associate (side => scene%element%node(kind%face(f), e))
-                  if (any(side == 0)) exit         ! the element had errors
-                  do i = adjacency%first(side(1)), adjacency%first(side(1) + 1) - 1
-                     other = adjacency%element(i)
-                     g = bent_side(scene, other, side)
-                     if (g == 0) cycle
-                     call add_error(reader%log, scene%element%origin(e), "element " // &
-                        to_text(scene%element%label(e)) // " has a straight side where " // &
-                        "element " // to_text(scene%element%label(other)) // " has node " // &
-                        to_text(scene%node%label(g)) // " between the corners: they come " // &
-                        "apart there; take one order of elements, or nodes of their own and *TIE")
-                     return
-                  end do
-               end associate
+               side = scene%element%node(kind%face(f), e)
+               if (any(side == 0)) exit            ! the element had errors
+               do i = adjacency%first(side(1)), adjacency%first(side(1) + 1) - 1
+                  other = adjacency%element(i)
+                  g = bent_side(scene, other, side)
+                  if (g == 0) cycle
+                  call add_error(reader%log, scene%element%origin(e), "element " // &
+                     to_text(scene%element%label(e)) // " has a straight side where " // &
+                     "element " // to_text(scene%element%label(other)) // " has node " // &
+                     to_text(scene%node%label(g)) // " between the corners: they come " // &
+                     "apart there; take one order of elements, or nodes of their own and *TIE")
+                  return
+               end do
             end do
          end associate
       end do
@@ -156,15 +156,15 @@ contains
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e
       integer, intent(in) :: side(:)             !! (2)
+      integer, allocatable :: own(:)
       integer :: f
 
       bent_side = 0
       associate (kind => scene%element%kinds(scene%element%kind(e)))
          if (kind%n_face_node < 3) return
          do f = 1, kind%n_face
-            associate (own => scene%element%node(kind%face(f), e))
-               if (all(own(:2) == side) .or. all(own(2:1:-1) == side)) bent_side = own(3)
-            end associate
+            own = scene%element%node(kind%face(f), e)
+            if (all(own(:2) == side) .or. all(own(2:1:-1) == side)) bent_side = own(3)
          end do
       end associate
    end function bent_side

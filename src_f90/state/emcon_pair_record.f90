@@ -224,12 +224,13 @@ contains
       type(range_t), intent(in) :: own           !! of it, in the set
       type(range_t), intent(in) :: by_law        !! and of laws alone
       real(wp) :: force(size(self%force, 1), size(system%space%body))
+      integer, allocatable :: acting(:)
       integer :: j, i, first
 
       first = system%first_constraint(k)
+      acting = [(j, j = own%first, own%last), (j, j = by_law%first, by_law%last)]
       associate (node => system%contact(k)%contact%node, &
-            duplicate => system%contact(k)%contact%duplicate, &
-            acting => [(j, j = own%first, own%last), (j, j = by_law%first, by_law%last)])
+            duplicate => system%contact(k)%contact%duplicate)
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp
             if (duplicate(i) > 0) force(:, duplicate(i)) = 0.0_wp

@@ -67,12 +67,12 @@ contains
    pure logical function is_given(numbering, node)
       type(numbering_t), intent(in) :: numbering
       integer, intent(in) :: node
+      integer :: n_dim
 
-      associate (n_dim => size(numbering%unknown, 1))
-         associate (from => numbering%start(n_dim*(node - 1) + 1) + 1, &
-               to => numbering%start(n_dim*node + 1))
-            is_given = all(numbering%column(from:to) == 0)
-         end associate
+      n_dim = size(numbering%unknown, 1)
+      associate (from => numbering%start(n_dim*(node - 1) + 1) + 1, &
+            to => numbering%start(n_dim*node + 1))
+         is_given = all(numbering%column(from:to) == 0)
       end associate
    end function is_given
 

@@ -27,6 +27,7 @@ contains
       class(shape_t), allocatable :: shape
       type(shape_table_t) :: table
       real(wp) :: size_of(1 + size(place, 1)), total(1 + size(place, 1))
+      real(wp), allocatable :: at(:, :)
       integer :: i
 
       total = 0.0_wp
@@ -34,16 +35,15 @@ contains
          associate (e => surface%element(i))
             associate (kind => scene%element%kinds(scene%element%kind(e)), &
                   section => scene%section(scene%element%section(e)))
-               associate (at => place(:, scene%element%node(kind%face(surface%face(i)), e)))
-                  if (scene%n_dim == n_space) then
-                     call face_shape_create(kind%n_face_node, shape)
-                     call shape_tabulate(shape, .true., table)
-                     call face_area(table, at, size_of)
-                  else
-                     call ring_area(at, .not. scene_is_flat(scene), size_of)
-                     if (scene_is_flat(scene)) size_of = section%thickness*size_of
-                  end if
-               end associate
+               at = place(:, scene%element%node(kind%face(surface%face(i)), e))
+               if (scene%n_dim == n_space) then
+                  call face_shape_create(kind%n_face_node, shape)
+                  call shape_tabulate(shape, .true., table)
+                  call face_area(table, at, size_of)
+               else
+                  call ring_area(at, .not. scene_is_flat(scene), size_of)
+                  if (scene_is_flat(scene)) size_of = section%thickness*size_of
+               end if
             end associate
          end associate
          total = total + size_of
