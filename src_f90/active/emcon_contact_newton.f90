@@ -114,10 +114,7 @@ contains
          if (size(row) == size(self%row)) self%early%goes_on = all(row == self%row)
       end if
       self%early%is_made = .false.
-      if (self%early%goes_on) then
-         call go_on(self, newton)
-         return
-      end if
+      if (self%early%goes_on) return
       newton%n_solve = 0
       n_slip = max(0, maxval(set%slip(:set%n_row)))
       self%turns = n_slip > 1 .and. any(self%law%mu > 0.0_wp)
@@ -141,28 +138,6 @@ contains
       self%is_rounding = .false.
       self%is_condensed = self%has_tangent
    end subroutine begin
-
-   !> From where the last solve ended early; where friction is led elsewhere since then forces may
-   !> have far to go.
-   pure subroutine go_on(self, newton)
-      type(contact_newton_t), intent(inout) :: self
-      type(newton_t), intent(inout) :: newton
-      logical :: is_led_anew
-      integer :: k
-
-      is_led_anew = .false.
-      associate (target => self%problem%slip_target)
-         do k = 1, size(self%law)
-            is_led_anew = is_led_anew .or. any(abs(self%law(k)%slip_target(:size(target, 1)) &
-               - target(:, k)) > 0.0_wp)
-            target(:, k) = self%law(k)%slip_target(:size(target, 1))
-         end do
-      end associate
-      if (.not. is_led_anew) return
-      self%step%mixes = .false.
-      self%rest = rest_t()
-      newton%n_solve = 0
-   end subroutine go_on
 
    !> Numbers that tell the rows of sets apart.
    pure function names_of(set) result(row)

@@ -3,6 +3,7 @@
 !> The exceptions that BLAS kernels raise inside are kept from the caller.
 module emcon_lapack
    use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
+   use emcon_blocks_lapack, only : dpotrf
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : dp
    use emcon_text, only : to_text
@@ -60,14 +61,6 @@ module emcon_lapack
          real(dp), intent(out) :: w(*), work(*)
          integer, intent(out) :: info
       end subroutine dsyev
-
-      subroutine dpotrf(uplo, n, a, lda, info)
-         import :: dp
-         character(len=1), intent(in) :: uplo
-         integer, intent(in) :: n, lda
-         real(dp), intent(inout) :: a(lda, *)
-         integer, intent(out) :: info
-      end subroutine dpotrf
 
       subroutine dpotrs(uplo, n, nrhs, a, lda, b, ldb, info)
          import :: dp

@@ -5,6 +5,7 @@
 !> and W^T W is a product of dense matrices.
 module emcon_row_panels
    use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
+   use emcon_blocks_lapack, only : dgemm, dsyrk
    use emcon_kinds, only : dp
    implicit none
    private
@@ -17,22 +18,6 @@ module emcon_row_panels
    end type row_panel_t
 
    interface
-      subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
-         import :: dp
-         character(len=1), intent(in) :: transa, transb
-         integer, intent(in) :: m, n, k, lda, ldb, ldc
-         real(dp), intent(in) :: alpha, a(lda, *), b(ldb, *), beta
-         real(dp), intent(inout) :: c(ldc, *)
-      end subroutine dgemm
-
-      subroutine dsyrk(uplo, trans, n, k, alpha, a, lda, beta, c, ldc)
-         import :: dp
-         character(len=1), intent(in) :: uplo, trans
-         integer, intent(in) :: n, k, lda, ldc
-         real(dp), intent(in) :: alpha, a(lda, *), beta
-         real(dp), intent(inout) :: c(ldc, *)
-      end subroutine dsyrk
-
       subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
          import :: dp
          character(len=1), intent(in) :: trans
