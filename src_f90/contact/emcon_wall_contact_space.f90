@@ -22,7 +22,7 @@ module emcon_wall_contact_space
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
    use emcon_wall_gap_space, only : dg_t, wall_gap, wall_gap_nodes
-   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_axis, wall_slip_t
+   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_t
    implicit none
    private
    public :: wall_contact_t, wall_contact_init
@@ -35,6 +35,8 @@ module emcon_wall_contact_space
    real(wp), parameter :: near_per_facet = 0.5_wp, near_per_motion = 2.0_wp
    !> A node faces a wall if it does so with this part of its area at least.
    real(wp), parameter :: least_faced = 0.25_wp
+   !> A vector that is normal to the wall but for this part of it is none to count slip along.
+   real(wp), parameter :: least_along = 0.5_wp
 
    type, extends(contact_t) :: wall_contact_t
       type(wall_t) :: wall
@@ -44,6 +46,8 @@ module emcon_wall_contact_space
       real(wp), allocatable :: size(:)                !! (n_constraint) mean facet there [L]
       real(wp) :: depth = 0.0_wp                      !! that pads and laws reach [L]
       real(wp), allocatable :: own_slack(:)           !! (n_constraint) of a guard beside mortar
+      !> (n_constraint) vectors of the wall that slip is counted along: as a rule, and in this step
+      integer, allocatable :: usual_along(:), along(:)
    contains
       procedure :: configure => wall_configure
       procedure :: begin_points => wall_begin_step
@@ -85,6 +89,7 @@ contains
                /real(size(around), wp)
          end associate
       end do
+      call choose_usual(self, scene%x)
       self%thickness = self%size
       self%depth = pair%interaction%offset + interaction_reach(pair%interaction)
       self%may_leave = .not. wall_is_solid(self%wall)
@@ -94,6 +99,37 @@ contains
       self%max_penetration_at_start = merge(huge(1.0_wp), deepest_start, wall_is_solid(self%wall))
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine wall_contact_init
+
+   !> Which vectors of the wall are the most along it, as the points lie in the reference.
+   pure subroutine choose_usual(self, x)
+      type(wall_contact_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
+      real(wp) :: u(size(x, 1), size(x, 2))
+      integer :: i
+
+      allocate(self%usual_along(self%n_constraint))
+      u = 0.0_wp
+      do i = 1, self%n_constraint
+         associate (normal => own_normal(self, i, x, u))
+            self%usual_along(i) = minloc(abs(normal), 1)
+         end associate
+      end do
+      self%along = self%usual_along
+   end subroutine choose_usual
+
+   !> The normal of the wall that point `i` sees at x + u, in the vectors of the wall.
+   pure function own_normal(self, i, x, u) result(normal)
+      type(wall_contact_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: normal(3)
+      type(wall_spot_t) :: spot
+
+      associate (at => wall_at(self%wall, x, u))
+         spot = wall_find(self%wall, at, point_in(self, i, x) + point_in(self, i, u))
+         normal = matmul(spot%normal, at(:, 2:) - spread(at(:, 1), 2, 3))/self%wall%arm
+      end associate
+   end function own_normal
 
    !> Corners of bodies are held nearly at once beside means of gaps, which do not see them.
    pure subroutine hold_corners(self, x)
@@ -170,11 +206,21 @@ contains
       type(contact_options_t), intent(in) :: options
    end subroutine wall_configure
 
-   !> There is nothing to choose but what is near: that never falls within a step.
+   !> There is nothing to choose but what is near, which never falls within a step, and which vector
+   !> of the wall slip is counted along: that stays the same over the step, and from step to step
+   !> unless the wall turns its normal into it.
    pure subroutine wall_begin_step(self, x, u0, du)
       class(wall_contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      integer :: i
 
+      do i = 1, self%n_constraint
+         associate (normal => own_normal(self, i, x, u0))
+            self%along(i) = self%usual_along(i)
+            if (1.0_wp - normal(self%along(i))**2 < least_along**2) self%along(i) &
+               = minloc(abs(normal), 1)
+         end associate
+      end do
       self%reach = max(self%reach, self%depth + near_per_facet*maxval([0.0_wp, self%size]), &
          self%depth + near_per_motion*sqrt(maxval([0.0_wp, sum(du(:, self%node)**2, 1)])))
       ! A wall that turns may move by more than its nodes: what is far now may be near soon.
@@ -280,6 +326,15 @@ contains
       way(:, 2:) = du(:, self%wall%node)
    end subroutine gather
 
+   !> Vector `k` of the wall in its vectors.
+   pure function axis_of(k) result(axis)
+      integer, intent(in) :: k                   !! 1 to 3
+      real(wp) :: axis(3)
+
+      axis = 0.0_wp
+      axis(k) = 1.0_wp
+   end function axis_of
+
    !> As `contact_t` has it.
    pure function wall_slip_over(self, i, x, u0, du) result(slip)
       class(wall_contact_t), intent(in) :: self
@@ -290,7 +345,7 @@ contains
       type(wall_slip_t) :: over
 
       call gather(self, i, x, u0, du, at, way)
-      call wall_slip(self%wall, at, way, wall_slip_axis(self%wall, at), .true., over)
+      call wall_slip(self%wall, at, way, axis_of(self%along(i)), .true., over)
       slip = over%f
    end function wall_slip_over
 
@@ -337,7 +392,7 @@ contains
       real(wp) :: weight(max_face_nodes)
       integer :: k, m, n, s, node(max_face_nodes)
 
-      call wall_slip(self%wall, at, way, wall_slip_axis(self%wall, at), item%leaves_second, slip)
+      call wall_slip(self%wall, at, way, axis_of(self%along(i)), item%leaves_second, slip)
       call find_parts(self, i, m, node, weight)
       call condition_resize_slip(item)
       n = item%n_node

@@ -14,7 +14,7 @@ module emcon_wall_slip_space
    use emcon_wall_distance_space, only : wall_bend, wall_find, wall_spot_t
    implicit none
    private
-   public :: wall_slip_t, wall_slip, wall_slip_axis, n_wall_point
+   public :: wall_slip_t, wall_slip, n_wall_point
 
    !> The point, and the origin and tips of vectors of the wall.
    integer, parameter :: n_wall_point = 5, n_dim = 3
@@ -105,19 +105,6 @@ contains
          end do
       end do
    end subroutine add_second
-
-   !> The vector of the wall that is most along it at a point: a direction for its slip.
-   pure function wall_slip_axis(wall, x) result(along)
-      type(wall_t), intent(in) :: wall
-      real(wp), intent(in) :: x(n_dim, n_wall_point)   !! point, origin, tips [L]
-      real(wp) :: along(n_dim)
-      type(wall_spot_t) :: start
-
-      start = wall_find(wall, own_vectors(wall), matmul(x(:, 1) - x(:, 2), x(:, 3:) &
-         - spread(x(:, 2), 2, n_dim))/wall%arm)
-      along = 0.0_wp
-      along(minloc(abs(start%normal), 1)) = 1.0_wp
-   end function wall_slip_axis
 
    !> Origin and tips of the wall in its vectors.
    pure function own_vectors(wall) result(own)

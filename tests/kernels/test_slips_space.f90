@@ -9,7 +9,7 @@ module test_slips_space
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    use emcon_wall, only : wall_t
-   use emcon_wall_slip_space, only : wall_slip, wall_slip_axis, wall_slip_t
+   use emcon_wall_slip_space, only : wall_slip, wall_slip_t
    use random_draws, only : draw_random
    use wall_shapes, only : make_wall, n_shape, turned
    implicit none
@@ -23,7 +23,7 @@ module test_slips_space
    integer, parameter :: of_frame = -1, of_edges = 0
    !> Nodes of a frame, of edges: none of the fifth.
    integer, parameter :: n_node = 5
-   !> A direction for frames.
+   !> A direction for frames and walls.
    real(wp), parameter :: along(3) = [0.3_wp, 0.9_wp, 0.2_wp]
 
    !> Slips by the coordinates of nodes.
@@ -111,7 +111,7 @@ contains
          slips%c(:, :4, :) = edges%c
          slips%h(:12, :12, :) = edges%h
       case default
-         call wall_slip(wall, x, dx, wall_slip_axis(wall, x), .false., one)
+         call wall_slip(wall, x, dx, along, .false., one)
          slips = slips_t(one%f, one%g, one%c, one%h)
       end select
    end subroutine find
@@ -239,7 +239,10 @@ contains
          case default                            ! normal to the first vector
             dx(:, 1) = draw
             call find(kind, wall, x, dx, slips)
-            call check_near(error, slips%f, draw(2:), tol, 1.0_wp, "wall")
+            associate (first => along(2:)/norm2(along(2:)))
+               call check_near(error, slips%f, [dot_product(first, draw(2:)), &
+                  first(1)*draw(3) - first(2)*draw(2)], tol, 1.0_wp, "wall")
+            end associate
          end select
       end do
    end subroutine test_plane

@@ -811,3 +811,43 @@ def test_a_sharp_punch_is_dragged_over_a_pad(kind: str, tmp_path: Path) -> None:
     # Edges climb onto elements and fall off them: in the mean over some that takes nothing.
     assert force[0] == pytest.approx(mu*force[1], rel=.1)
     dissipates(run)
+
+
+def ball_on_a_pad(mu: float, h: float, law: str = "", angle: float = 0.0, cells: tuple[int, int, int] = (8, 5, 2)) -> str:
+    """A ball of radius .6, a wall, is pressed into a soft pad and drawn along it; all but the wall's vectors turned."""
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    pad = Block("C3D8", cells, size=(2.4, 1.5, .6), place=lambda x: (x - np.array([1.2, .75, .6])) @ turn.T)
+    at = (-.5*c, -.5*s, .6)
+    text = bodies([pad], [faces(pad, 2, 1)], "*HYPERELASTIC, NEO HOOKE\n.5, .4\n*DENSITY\n1.\n")
+    text += walls.wall(walls.sphere(.6, at), at) + walls.pair("", f"{law}*FRICTION\n{mu}\n") + "*NSET, NSET=BASE\n"
+    text += "".join(f"{i},\n" for i in pad.on(2, 0)) + "*BOUNDARY\nBASE, 1, 3\n"
+    held = f"{walls.REFERENCE}, 4, 6\n"
+    return text + "".join(f"*STEP, NLGEOM\n*STATIC\n{step}, 1.\n*BOUNDARY\n{b}*NODE FILE\nU\n*END STEP\n" for step, b in (
+        (.5, f"{walls.REFERENCE}, 1, 2\n{walls.REFERENCE}, 3, 3, -.05\n{held}"),
+        (h, f"{walls.REFERENCE}, 1, 1, {.35*c}\n{walls.REFERENCE}, 2, 2, {.35*s}\n")))
+
+
+@pytest.mark.parametrize(("mu", "h"), [(.3, .04), (.8, .1), (.8, .04)])
+def test_a_ball_is_dragged_over_a_pad(mu: float, h: float, tmp_path: Path) -> None:
+    """Where nodes are over the ball makes no difference to where friction points."""
+    run = ran(tmp_path, ball_on_a_pad(mu, h))
+    assert run.verdict["verdict"] == "good"
+    assert run.history["cuts"].sum() == 0
+    dissipates(run)
+
+
+@pytest.mark.parametrize("law", ["", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n200.\n"])
+def test_a_drag_turned_is_the_same(law: str, tmp_path: Path) -> None:
+    """Springs of stick too, whose stretch is kept from step to step; but for the square of the angle that the ball's normal
+    turns by over an increment, as directions are those of its middle."""
+    runs = []
+    for name, angle in (("a", 0.0), ("b", .6)):
+        text = ball_on_a_pad(.3, .05, law, angle)
+        if law:
+            text = text.replace("*FRICTION\n0.3\n", "*FRICTION\n0.3, 2.\n")
+        (tmp_path/name).mkdir()
+        runs.append(ran(tmp_path/name, text))
+    for name in ("strain", "external_work", "friction_loss"):
+        one, other = (run.history[name] for run in runs)
+        assert np.abs(one - other).max() <= (.05*.35/.6)**2*np.abs(one).max(), name
