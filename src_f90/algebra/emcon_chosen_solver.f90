@@ -277,6 +277,7 @@ contains
 
       self%is_converged = .true.
       if (self%by == by_iterations) then
+         self%iterative%accuracy = self%accuracy
          call self%iterative%solve(rhs, x, error)
          if (allocated(error) .or. self%iterative%is_converged) return
          call factorise_after_all(self, error)

@@ -9,7 +9,7 @@ module emcon_convergence
    implicit none
    private
    public :: convergence_t, convergence_init, convergence_begin, convergence_judge, &
-      convergence_nears_end
+      convergence_accuracy, convergence_nears_end
    public :: next_done, next_tangent, next_old_tangent, next_give_up, round_off, most_rounding
 
    !> What follows an evaluation.
@@ -23,6 +23,9 @@ module emcon_convergence
    !> Corrections with an old factorisation at most, and the factor each has to gain.
    integer, parameter :: most_polish = 3
    real(wp), parameter :: polish_gain = 0.5_wp
+   !> Of the residual, what a correction may leave at least and at most; and the part it may leave
+   !> of what the next residual will be.
+   real(wp), parameter :: least_left = 1.0e-4_wp, most_left = 1.0e-2_wp, part_left = 0.1_wp
    !> A new best residual is at least this much smaller. After so many iterations without one the
    !> step has failed; after a few it has converged, if it is below this multiple of epsilon.
    real(wp), parameter :: stall_gain = 0.9_wp
@@ -108,6 +111,18 @@ contains
          nears_end = self%last*(self%last/self%history(n - 1))**2 <= self%tolerance
       end associate
    end function convergence_nears_end
+
+   !> How much of the residual the next correction may leave, by a tangent: a part of what the square
+   !> of the last gain will leave of it anyway, and of round-off (Eisenstat and Walker, SIAM J. Sci.
+   !> Comput. 17, 1996).
+   pure real(wp) function convergence_accuracy(self) result(left)
+      type(convergence_t), intent(in) :: self
+
+      left = most_left
+      if (self%n_history > 1) left = part_left*(self%last/self%history(self%n_history - 1))**2
+      left = min(max(left, least_left), most_left)
+      if (self%n_history > 0) left = max(left, part_left*min(1.0_wp, kept_floor/self%last))
+   end function convergence_accuracy
 
    !> What to do next, now that the largest relative residual is `size`.
    pure subroutine convergence_judge(self, size, is_rounding, next)

@@ -426,17 +426,21 @@ contains
    end function correction_reason
 
    !> Correction `dq` of the unknowns, and for the saddle point that of the multipliers.
-   subroutine correction_solve(self, set, residual, dq, dlam, error)
+   subroutine correction_solve(self, set, residual, dq, dlam, error, accuracy)
       type(correction_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown) with contact forces
       real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
       real(wp), intent(out), contiguous :: dlam(:)         !! (n)
       type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: accuracy   !! > 0, that is enough where solutions need not
+                                                   !! be exact, instead of `newton_accuracy`
 
       dlam = 0.0_wp
       if (set%n == 0) then
          if (self%is_definite) then
+            self%definite_solver%accuracy = newton_accuracy
+            if (present(accuracy)) self%definite_solver%accuracy = real(accuracy, dp)
             call self%definite_solver%solve(residual, dq, error)
          else
             call self%solver%solve(residual, dq, error)

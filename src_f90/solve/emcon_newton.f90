@@ -9,9 +9,9 @@ module emcon_newton
    use emcon_constraints, only : constraint_set_t, constraints_add_law_forces, &
       constraints_add_rounding, constraints_add_row_forces, constraints_evaluate, &
       constraints_force, constraints_rounding, constraints_take_hold
-   use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
-      convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
-      round_off
+   use emcon_convergence, only : convergence_accuracy, convergence_begin, convergence_init, &
+      convergence_judge, convergence_nears_end, convergence_t, most_rounding, next_done, &
+      next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_is_lost, correction_lay_out, &
       correction_multipliers, correction_solve, correction_t, correction_ticks, correction_work
    use emcon_early_set, only : early_enough, predicts_new_set
@@ -425,7 +425,8 @@ contains
       integer :: left
 
       call phase_enter(system%phases, phase_solve, left)
-      call correction_solve(self%correction, set, self%residual, self%dq, self%dlam, error)
+      call correction_solve(self%correction, set, self%residual, self%dq, self%dlam, error, &
+         convergence_accuracy(self%convergence))
       call phase_leave(system%phases, left)
       if (allocated(error)) return
       system%phases%n_solve = system%phases%n_solve + 1
