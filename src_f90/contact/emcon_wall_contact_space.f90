@@ -314,10 +314,10 @@ contains
       item%node(:m + n - 1) = [node(:m), self%wall%node(:n - 1)]
       g = 0.0_wp
       c = 0.0_wp
-      h = 0.0_wp
       associate (in_order => [(k, k = 1, n_of_gap)])
          call nodes_add_first(1.0_wp, gap%g, in_order, g)
          call nodes_add_first(1.0_wp, gap%c, in_order, c)
+         if (.not. item%leaves_second) h = 0.0_wp
          if (.not. item%leaves_second) call nodes_add_second(1.0_wp, n_dim, gap%h, in_order, h)
       end associate
       associate (share => [weight(:m), (1.0_wp, k = 2, n)])
