@@ -470,35 +470,33 @@ contains
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
       real(wp) :: weight(size(row), 3)
-      integer :: place(item%n_node), corner(3), k, s
+      integer :: place(1 + size(row)), corner(3), i, k, n, s
 
       call condition_resize_slip(item)
-      place = [(k, k = 1, item%n_node)]
-      associate (n => item%n_node, n_slip => size(slip%f))
-         item%slip(:n_slip) = 0.0_wp
-         item%t(:, :n, :n_slip) = 0.0_wp
-         item%t1(:, :n, :n_slip) = 0.0_wp
-         if (.not. item%leaves_second) item%ht(:3*n, :3*n, :n_slip) = 0.0_wp
-      end associate
+      place(1) = 1
       do k = 1, size(stencil%patch%slip_share)
          if (.not. stencil%patch%slip_share(k) > 0.0_wp) cycle
          corner = slip_corner(stencil, k)
          slip = slip_over(corner, at, way, item%leaves_second)
          ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
-         associate (by => stencil%weight(row, 2 + corner))
-            weight(:, 1) = by(:, 2) - by(:, 1)
-            weight(:, 2) = by(:, 3) - by(:, 1)
-            weight(:, 3) = -by(:, 1)
-         end associate
-         do s = 1, size(slip%f)
-            item%slip(s) = item%slip(s) + stencil%patch%slip_share(k)*slip%f(s)
-            call node_sums_first(slip%g(:, s), weight, stencil%patch%slip_share(k), place, &
-               item%t(:, :, s))
-            call node_sums_first(slip%c(:, s), weight, stencil%patch%slip_share(k), place, &
-               item%t1(:, :, s))
-            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, &
-               stencil%patch%slip_share(k), place, item%ht(:, :, s))
+         n = 0
+         do i = 1, size(row)
+            associate (by => stencil%weight(row(i), 2 + corner))
+               if (.not. any(abs(by) > 0.0_wp)) cycle
+               n = n + 1
+               place(1 + n) = 1 + i
+               weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
+            end associate
          end do
+         associate (share => stencil%patch%slip_share(k), to => place(:1 + n))
+            do s = 1, size(slip%f)
+               item%slip(s) = item%slip(s) + share*slip%f(s)
+               call node_sums_first(slip%g(:, s), weight(:n, :), share, to, item%t(:, :, s))
+               call node_sums_first(slip%c(:, s), weight(:n, :), share, to, item%t1(:, :, s))
+               if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), &
+                  weight(:n, :), share, to, item%ht(:, :, s))
+            end do
+         end associate
       end do
    end subroutine add_slip
 
