@@ -29,8 +29,8 @@ module emcon_patch_contact_space
       patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
       patch_uses
-   use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
-      patch_stencil_height, patch_stencil_t
+   use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_choose, &
+      patch_stencil_gather, patch_stencil_height, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
@@ -306,8 +306,11 @@ contains
       class(patch_contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       integer :: i
+      logical :: is_chosen                       ! from here
 
+      is_chosen = position_memo_holds(self%memo, self%near%node, x, u0)
       do i = 1, self%n_constraint
+         call patch_stencil_begin(self%stencil(i), x, u0, is_chosen)
          call measure_frame(self, i, x, u0, du)
       end do
    end subroutine patch_measure
@@ -365,9 +368,12 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
       type(condition_t), intent(inout) :: item(:)   !! (n)
+      logical :: is_chosen                       ! from here
       integer :: k
 
+      is_chosen = position_memo_holds(self%memo, self%near%node, x, u0)
       do k = 1, size(wanted)
+         call patch_stencil_begin(self%stencil(wanted(k)), x, u0, is_chosen)
          if (item(k)%has_friction) call find_shares(self%stencil(wanted(k)), x, u0)
          call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset &
             + self%sagitta(wanted(k)), item(k))
