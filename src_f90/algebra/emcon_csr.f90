@@ -13,7 +13,7 @@ module emcon_csr
    public :: csr_t, csr_from_elements, csr_from_entries, csr_from_values, csr_sort_columns
    public :: csr_list_users, csr_find, csr_is_same, csr_is_symmetric, csr_copy_pattern
    public :: csr_copy_filled
-   public :: csr_multiply, csr_multiply_transposed, csr_pick_rows, csr_transpose
+   public :: csr_multiply, csr_multiply_transposed, csr_pick_rows, csr_append, csr_transpose
 
    type :: csr_t
       integer :: n_row = 0
@@ -287,6 +287,20 @@ contains
          end associate
       end do
    end subroutine csr_pick_rows
+
+   !> The first `n` rows of another behind the first `n` of its own.
+   pure subroutine csr_append(self, other, n)
+      type(csr_t), intent(inout) :: self
+      type(csr_t), intent(in) :: other           !! of as many columns
+      integer, intent(in) :: n                   !! >= 0
+
+      associate (own => self%row_start(n + 1), more => other%row_start(n + 1))
+         self%column = [self%column(:own), other%column(:more)]
+         self%value = [self%value(:own), other%value(:more)]
+         self%row_start = [self%row_start(:n + 1), own + other%row_start(2:n + 1)]
+      end associate
+      self%n_row = 2*n
+   end subroutine csr_append
 
    !> Slot of the entry (i, j), both from 1; 0 if the pattern has no such entry.
    pure integer function csr_find(self, i, j)

@@ -172,12 +172,12 @@ contains
       end if
       associate (n_dim => size(self%g, 1), n => size(self%g, 2), m => size(self%h, 1))
          if (.not. allocated(self%t)) allocate(self%t(n_dim, n, n_dim - 1), &
-            self%t1(n_dim, n, n_dim - 1), self%ht(m, m, n_dim - 1))
+            self%t1(n_dim, n, n_dim - 1), self%ht(m, m, n_dim - 1), source=0.0_wp)
       end associate
       self%slip = 0.0_wp
       self%t = 0.0_wp
       self%t1 = 0.0_wp
-      self%ht = 0.0_wp
+      if (.not. self%leaves_second) self%ht = 0.0_wp
    end subroutine condition_resize_slip
 
 end module emcon_condition_nodes

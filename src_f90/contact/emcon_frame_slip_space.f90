@@ -4,7 +4,7 @@
 !> has forces without resultant and moment, and rigid turns are no slip. Source: docs/theory.md,
 !> section 14.3.
 module emcon_frame_slip_space
-   use emcon_frame_vertex_space, only : at_eta, at_xi, frame_of, frame_vertex, frame_vertex_t, &
+   use emcon_frame_vertex_space, only : at_eta, at_xi, frame_affine, frame_of, frame_vertex_t, &
       n_frame_var
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
@@ -41,7 +41,7 @@ contains
       a = x(:, 2) - x(:, 1)
       b = x(:, 3) - x(:, 1)
       basis = tangent_basis(cross_product(a, b), along)
-      call frame_vertex(frame_of(x(:, :3), dx(:, :3), leaves_second), x(:, 4), dx(:, 4), place, &
+      call frame_affine(frame_of(x(:, :3), dx(:, :3), leaves_second), x(:, 4), dx(:, 4), place, &
          second)
       do k = 1, 2
          associate (by_xi => dot_product(basis(:, k), a), by_eta => dot_product(basis(:, k), b))

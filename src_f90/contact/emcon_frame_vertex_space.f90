@@ -10,8 +10,8 @@ module emcon_frame_vertex_space
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: frame_t, frame_of, frame_vertex_t, frame_vertex, frame_place, frame_places, &
-      frame_area_t, frame_area, frame_size
+   public :: frame_t, frame_of, frame_vertex_t, frame_vertex, frame_affine, frame_place, &
+      frame_places, frame_area_t, frame_area, frame_size
 
    !> Local numbers: coordinates along both vectors of the frame, height over their plane.
    integer, parameter, public :: at_xi = 1, at_eta = 2, at_height = 3
@@ -133,44 +133,78 @@ contains
       type(frame_vertex_t), intent(out) :: vertex
       !> (i, j, which) derivative of g(i, which) by variable j at the end; only of a frame with such
       real(wp), intent(inout) :: second(:, :, :)
-      type(difference_t) :: d
-      type(dg_t) :: xi, eta, s(3)
-      integer :: i
 
+      call frame_affine(frame, x, dx, vertex, second)
       if (frame%leaves_second) then
-         call vertex_first(frame, x, dx, vertex)
-         return
+         call take_first(at_height, height_first(way_first(frame, x, dx), frame%a_first, &
+            frame%b_first), vertex)
+      else
+         call take(at_height, dg_height(way(frame, x, dx), frame%a, frame%b), vertex, second)
       end if
-      d = difference_t(4, 1, x - frame%x, (x - frame%x) + (dx - frame%dx), dx - frame%dx)
-      call dg_affine(d, frame%a, frame%b, frame%plane, xi, eta)
-      s = [xi, eta, dg_height(d, frame%a, frame%b)]
-      do i = at_xi, at_height
-         vertex%f(i, :) = [s(i)%f0, s(i)%f1]
-         vertex%df(i) = s(i)%df
-         vertex%g(:, i) = s(i)%g
-         vertex%c(:, i) = s(i)%c
-         second(:, :, i) = s(i)%h
-      end do
    end subroutine frame_vertex
 
-   !> The same without second derivatives.
-   pure subroutine vertex_first(frame, x, dx, vertex)
+   !> Its affine coordinates alone.
+   pure subroutine frame_affine(frame, x, dx, vertex, second)
+      type(frame_t), intent(in) :: frame
+      real(wp), intent(in) :: x(3), dx(3)        !! where it starts, how it moves [L]
+      type(frame_vertex_t), intent(out) :: vertex    !! with no height
+      real(wp), intent(inout) :: second(:, :, :) !! as `frame_vertex`
+      type(dg_t) :: xi, eta
+      type(dg_first_t) :: xi_first, eta_first
+
+      if (frame%leaves_second) then
+         call affine_first(way_first(frame, x, dx), frame%a_first, frame%b_first, &
+            frame%plane_first, xi_first, eta_first)
+         call take_first(at_xi, xi_first, vertex)
+         call take_first(at_eta, eta_first, vertex)
+      else
+         call dg_affine(way(frame, x, dx), frame%a, frame%b, frame%plane, xi, eta)
+         call take(at_xi, xi, vertex, second)
+         call take(at_eta, eta, vertex, second)
+      end if
+   end subroutine frame_affine
+
+   !> The way to a point from the origin of the frame.
+   pure type(difference_t) function way(frame, x, dx)
       type(frame_t), intent(in) :: frame
       real(wp), intent(in) :: x(3), dx(3)
-      type(frame_vertex_t), intent(inout) :: vertex
-      type(difference_first_t) :: d
-      type(dg_first_t) :: xi, eta, s(3)
-      integer :: i
 
-      d = difference_first_t(4, 1, x - frame%x, (x - frame%x) + (dx - frame%dx), dx - frame%dx)
-      call affine_first(d, frame%a_first, frame%b_first, frame%plane_first, xi, eta)
-      s = [xi, eta, height_first(d, frame%a_first, frame%b_first)]
-      do i = at_xi, at_height
-         vertex%f(i, :) = [s(i)%f0, s(i)%f1]
-         vertex%df(i) = s(i)%df
-         vertex%g(:, i) = s(i)%g
-         vertex%c(:, i) = s(i)%c
-      end do
-   end subroutine vertex_first
+      way = difference_t(4, 1, x - frame%x, (x - frame%x) + (dx - frame%dx), dx - frame%dx)
+   end function way
+
+   !> The same without second derivatives.
+   pure type(difference_first_t) function way_first(frame, x, dx)
+      type(frame_t), intent(in) :: frame
+      real(wp), intent(in) :: x(3), dx(3)
+
+      way_first = difference_first_t(4, 1, x - frame%x, (x - frame%x) + (dx - frame%dx), &
+         dx - frame%dx)
+   end function way_first
+
+   !> Take a number as one of the place.
+   pure subroutine take(i, s, vertex, second)
+      integer, intent(in) :: i                   !! which: `at_xi`, `at_eta`, `at_height`
+      type(dg_t), intent(in) :: s
+      type(frame_vertex_t), intent(inout) :: vertex
+      real(wp), intent(inout) :: second(:, :, :)
+
+      vertex%f(i, :) = [s%f0, s%f1]
+      vertex%df(i) = s%df
+      vertex%g(:, i) = s%g
+      vertex%c(:, i) = s%c
+      second(:, :, i) = s%h
+   end subroutine take
+
+   !> The same without second derivatives.
+   pure subroutine take_first(i, s, vertex)
+      integer, intent(in) :: i
+      type(dg_first_t), intent(in) :: s
+      type(frame_vertex_t), intent(inout) :: vertex
+
+      vertex%f(i, :) = [s%f0, s%f1]
+      vertex%df(i) = s%df
+      vertex%g(:, i) = s%g
+      vertex%c(:, i) = s%c
+   end subroutine take_first
 
 end module emcon_frame_vertex_space

@@ -26,7 +26,7 @@ module emcon_mortar_space
       mortar_sight, sight_t
    use emcon_patch_gap_space, only : patch_sums_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
-   use emcon_patch_stencil_space, only : patch_stencil_gather
+   use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_gather
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
    implicit none
@@ -289,6 +289,7 @@ contains
 
       is_start = position_memo_holds(self%memo, self%faces%near%node, x, u0)
       do t = 1, size(self%faces%stencil)
+         call patch_stencil_begin(self%faces%stencil(t), x, u0, is_start)
          call look(self, t, x, u0, du, self%knows_start .and. is_start)
       end do
       self%knows_start = is_start
@@ -381,7 +382,9 @@ contains
       integer, allocatable :: facet(:)
       integer :: place(self%n_constraint)        !! of each among `wanted`; 0: nowhere
       integer :: f, k, t
+      logical :: is_chosen                       ! from here
 
+      is_chosen = position_memo_holds(self%memo, self%faces%near%node, x, u0)
       place = 0
       place(wanted) = [(k, k = 1, size(wanted))]
       call find_asked(self%faces, wanted, facet, slot)
@@ -389,6 +392,9 @@ contains
       do f = 1, size(facet)
          associate (first => self%faces%split%start(facet(f)), &
                last => self%faces%split%start(facet(f) + 1) - 1)
+            do t = first, last
+               call patch_stencil_begin(self%faces%stencil(t), x, u0, is_chosen)
+            end do
             call mortar_sight(self%faces, first, x, u0, du, all(item%leaves_second), &
                sight(slot(first):slot(last)))
             if (.not. any(item%has_friction)) cycle

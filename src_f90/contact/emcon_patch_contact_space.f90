@@ -29,8 +29,8 @@ module emcon_patch_contact_space
       patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
       patch_uses
-   use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
-      patch_stencil_height, patch_stencil_t
+   use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_choose, &
+      patch_stencil_gather, patch_stencil_height, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
@@ -306,8 +306,11 @@ contains
       class(patch_contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       integer :: i
+      logical :: is_chosen                       ! from here
 
+      is_chosen = position_memo_holds(self%memo, self%near%node, x, u0)
       do i = 1, self%n_constraint
+         call patch_stencil_begin(self%stencil(i), x, u0, is_chosen)
          call measure_frame(self, i, x, u0, du)
       end do
    end subroutine patch_measure
@@ -365,9 +368,12 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
       type(condition_t), intent(inout) :: item(:)   !! (n)
+      logical :: is_chosen                       ! from here
       integer :: k
 
+      is_chosen = position_memo_holds(self%memo, self%near%node, x, u0)
       do k = 1, size(wanted)
+         call patch_stencil_begin(self%stencil(wanted(k)), x, u0, is_chosen)
          if (item(k)%has_friction) call find_shares(self%stencil(wanted(k)), x, u0)
          call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset &
             + self%sagitta(wanted(k)), item(k))
@@ -470,35 +476,33 @@ contains
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
       real(wp) :: weight(size(row), 3)
-      integer :: place(item%n_node), corner(3), k, s
+      integer :: place(1 + size(row)), corner(3), i, k, n, s
 
       call condition_resize_slip(item)
-      place = [(k, k = 1, item%n_node)]
-      associate (n => item%n_node, n_slip => size(slip%f))
-         item%slip(:n_slip) = 0.0_wp
-         item%t(:, :n, :n_slip) = 0.0_wp
-         item%t1(:, :n, :n_slip) = 0.0_wp
-         if (.not. item%leaves_second) item%ht(:3*n, :3*n, :n_slip) = 0.0_wp
-      end associate
+      place(1) = 1
       do k = 1, size(stencil%patch%slip_share)
          if (.not. stencil%patch%slip_share(k) > 0.0_wp) cycle
          corner = slip_corner(stencil, k)
          slip = slip_over(corner, at, way, item%leaves_second)
          ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
-         associate (by => stencil%weight(row, 2 + corner))
-            weight(:, 1) = by(:, 2) - by(:, 1)
-            weight(:, 2) = by(:, 3) - by(:, 1)
-            weight(:, 3) = -by(:, 1)
-         end associate
-         do s = 1, size(slip%f)
-            item%slip(s) = item%slip(s) + stencil%patch%slip_share(k)*slip%f(s)
-            call node_sums_first(slip%g(:, s), weight, stencil%patch%slip_share(k), place, &
-               item%t(:, :, s))
-            call node_sums_first(slip%c(:, s), weight, stencil%patch%slip_share(k), place, &
-               item%t1(:, :, s))
-            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, &
-               stencil%patch%slip_share(k), place, item%ht(:, :, s))
+         n = 0
+         do i = 1, size(row)
+            associate (by => stencil%weight(row(i), 2 + corner))
+               if (.not. any(abs(by) > 0.0_wp)) cycle
+               n = n + 1
+               place(1 + n) = 1 + i
+               weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
+            end associate
          end do
+         associate (share => stencil%patch%slip_share(k), to => place(:1 + n))
+            do s = 1, size(slip%f)
+               item%slip(s) = item%slip(s) + share*slip%f(s)
+               call node_sums_first(slip%g(:, s), weight(:n, :), share, to, item%t(:, :, s))
+               call node_sums_first(slip%c(:, s), weight(:n, :), share, to, item%t1(:, :, s))
+               if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), &
+                  weight(:n, :), share, to, item%ht(:, :, s))
+            end do
+         end associate
       end do
    end subroutine add_slip
 

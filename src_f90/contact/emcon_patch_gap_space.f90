@@ -9,8 +9,8 @@ module emcon_patch_gap_space
       frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
    use emcon_patch_field_space, only : field_t, place_field
-   use emcon_patch_look_space, only : patch_t, place_vertices
-   use emcon_patch_moments_space, only : patch_misses, patch_moments, patch_products
+   use emcon_patch_look_space, only : patch_begin, patch_moments_of, patch_sees, patch_start_t, &
+      patch_t, place_vertices
    use emcon_patch_sum_space, only : patch_sums_t, sums_make, sums_mix, sums_mix_t, sums_take, &
       sums_take_change
    implicit none
@@ -68,13 +68,18 @@ contains
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! as `patch_gap`
       logical, intent(in) :: leaves_second       !! no gap with second derivatives is asked for
       type(patch_open_t), intent(out) :: open
-      real(wp) :: place(3, patch%n_vertex, 0:1), corner(2, 3, 0:1)
+      real(wp) :: place(3, patch%n_vertex), corner(2, 3, 0:1)
       type(frame_t) :: frame
+      type(patch_start_t) :: start
       integer :: end, j, k, n_second
 
-      call place_vertices(patch, x, place(:, :, 0))
-      call place_vertices(patch, x + dx, place(:, :, 1))
-      call choose_fields(patch, place, open)
+      call place_vertices(patch, x + dx, place)
+      if (allocated(patch%start)) then
+         call choose_fields(patch, patch%start, place, open)
+      else
+         call patch_begin(patch, x, start)
+         call choose_fields(patch, start, place, open)
+      end if
       frame = frame_of(x(:, :3), dx(:, :3), leaves_second)
       n_second = merge(0, n_frame_var, leaves_second)
       allocate(open%at(open%n_vertex), open%second(n_second, n_second, 3, open%n_vertex))
@@ -224,25 +229,26 @@ contains
    end subroutine to_patch
 
    !> The triangles over the patch at either end, and their vertices.
-   pure subroutine choose_fields(patch, place, open)
+   pure subroutine choose_fields(patch, start, place, open)
       type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+      type(patch_start_t), intent(in) :: start   !! what it sees there
+      real(wp), intent(in) :: place(:, :)        !! (3, n_vertex) at the end
       type(patch_open_t), intent(inout) :: open
       type(field_t) :: field
       integer :: number(patch%n_vertex), i, k, n
-      logical :: is_seen(patch%n_triangle)
+      logical :: is_seen(patch%n_triangle), is_over
 
-      do k = 1, patch%n_triangle
-         is_seen(k) = .not. is_missed(patch, place(:2, patch%triangle(:, k), :))
-      end do
-      allocate(open%vertex(patch%n_vertex), open%field(count(is_seen)))
+      call patch_sees(patch, start, place, is_seen)
+      allocate(open%vertex(patch%n_vertex), open%field(count(is_seen .or. start%number > 0)))
       number = 0
       n = 0
       do k = 1, patch%n_triangle
-         if (.not. is_seen(k)) cycle
-         associate (t => patch%triangle(:, k))
+         is_over = start%number(k) > 0
+         if (.not. (is_seen(k) .or. is_over)) cycle
+         associate (t => patch%triangle(:, k), n_weight => patch%area%n_weight)
             field = field_t()
-            call find_moments(patch, place(:2, t, :), field)
+            if (is_over) field%moment(:n_weight, :, 0) = start%moment(:, :, start%number(k))
+            if (is_seen(k)) field%moment(:n_weight, :, 1) = patch_moments_of(patch, place(:2, t))
             if (.not. any(abs(field%moment) > 0.0_wp)) cycle
             n = n + 1
             do i = 1, 3
@@ -258,31 +264,6 @@ contains
       end do
       if (n < size(open%field)) open%field = open%field(:n)
    end subroutine choose_fields
-
-   !> Is a triangle beside a patch at both ends?
-   pure logical function is_missed(patch, corner)
-      type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: corner(2, 3, 0:1)
-
-      is_missed = patch_misses(patch%area, corner(:, :, 0))
-      if (is_missed) is_missed = patch_misses(patch%area, corner(:, :, 1))
-   end function is_missed
-
-   !> The moments of a triangle at both ends.
-   pure subroutine find_moments(patch, corner, field)
-      type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: corner(2, 3, 0:1)
-      type(field_t), intent(inout) :: field
-      integer :: end
-
-      do end = 0, 1
-         if (patch%area%n_weight > 1) then
-            field%moment(:, :, end) = patch_products(patch%area, corner(:, :, end))
-         else
-            field%moment(1, :, end) = patch_moments(patch%area, corner(:, :, end))
-         end if
-      end do
-   end subroutine find_moments
 
    !> First derivatives by the frame and by the vertices.
    pure subroutine gather_first(at, by, end_by, gap)

@@ -5,15 +5,28 @@ module emcon_patch_look_space
    use emcon_frame_vertex_space, only : frame_places, frame_size
    use emcon_kinds, only : wp
    use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moments, patch_products
-   use emcon_polygon_clip_space, only : barycentric
+   use emcon_polygon_clip_space, only : barycentric, polygon_beside
    implicit none
    private
-   public :: patch_t, place_vertices, patch_look_t, patch_look, patch_basis_t, patch_basis, &
-      patch_shares, patch_cells
+   public :: patch_t, patch_start_t, patch_begin, place_vertices, patch_look_t, patch_look, &
+      patch_basis_t, patch_basis, patch_shares, patch_cells, patch_moments_of, patch_sees
 
    !> Places at which a field is given, in the coordinates of the patch.
    real(wp), parameter, public :: unit_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
       0.0_wp, 1.0_wp], [2, 3])
+
+   !> What is beside a patch by more than so many of the largest changes of coordinates stays so:
+   !> sides are slanted by two at most, and as much again is far more than round-off.
+   real(wp), parameter :: far_beside = 4.0_wp
+
+   !> What a patch sees as a step begins.
+   type :: patch_start_t
+      real(wp), allocatable :: place(:, :)       !! (3, n_vertex) where vertices are in it
+      !> (n_triangle) number among those over it; 0: it is beside it
+      integer, allocatable :: number(:)
+      real(wp), allocatable :: beside(:)         !! (n_triangle) how far
+      real(wp), allocatable :: moment(:, :, :)   !! (weight, place, those over it) of triangles
+   end type patch_start_t
 
    !> The triangles that a patch may see in a step.
    type :: patch_t
@@ -27,6 +40,7 @@ module emcon_patch_look_space
       !> (n_triangle + 1) of slip over each triangle, then over the nearest one: those of the start
       !> of the step; not allocated: nobody has asked yet
       real(wp), allocatable :: slip_share(:)
+      type(patch_start_t), allocatable :: start  !! of the step; only if it is kept
    end type patch_t
 
    !> What a patch sees at both ends of a step.
@@ -62,20 +76,97 @@ contains
       end associate
    end subroutine place_vertices
 
+   !> What a patch sees as a step begins.
+   pure subroutine patch_begin(patch, x, start)
+      type(patch_t), intent(in) :: patch         !! that looks
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      type(patch_start_t), intent(out) :: start
+      integer :: k, n
+
+      allocate(start%place(3, patch%n_vertex), start%number(patch%n_triangle), &
+         start%beside(patch%n_triangle))
+      call place_vertices(patch, x, start%place)
+      n = 0
+      do k = 1, patch%n_triangle
+         start%number(k) = 0
+         start%beside(k) = polygon_beside(patch%area%side(:, :patch%area%n_side), &
+            start%place(:2, patch%triangle(:, k)))
+         if (patch_misses(patch%area, start%place(:2, patch%triangle(:, k)))) cycle
+         n = n + 1
+         start%number(k) = n
+      end do
+      allocate(start%moment(patch%area%n_weight, 3, n))
+      do k = 1, patch%n_triangle
+         if (start%number(k) > 0) start%moment(:, :, start%number(k)) = patch_moments_of(patch, &
+            start%place(:2, patch%triangle(:, k)))
+      end do
+   end subroutine patch_begin
+
+   !> Which triangles are over a patch, where its vertices are at `place`.
+   pure subroutine patch_sees(patch, start, place, is_seen)
+      type(patch_t), intent(in) :: patch
+      type(patch_start_t), intent(in) :: start   !! as the step begins
+      real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
+      logical, intent(out) :: is_seen(:)         !! (n_triangle)
+      real(wp) :: far
+      integer :: j, k
+
+      far = 0.0_wp
+      do j = 1, patch%n_vertex
+         far = max(far, abs(place(1, j) - start%place(1, j)), abs(place(2, j) - start%place(2, j)))
+      end do
+      far = far_beside*far
+      do k = 1, patch%n_triangle
+         is_seen(k) = .not. start%beside(k) > far
+         if (is_seen(k)) is_seen(k) = .not. patch_misses(patch%area, place(:2, &
+            patch%triangle(:, k)))
+      end do
+   end subroutine patch_sees
+
+   !> Moments of a triangle over a patch, of each weight.
+   pure function patch_moments_of(patch, corner) result(moment)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
+      real(wp) :: moment(patch%area%n_weight, 3)
+
+      if (patch%area%n_weight > 1) then
+         moment = patch_products(patch%area, corner)
+      else
+         moment(1, :) = patch_moments(patch%area, corner)
+      end if
+   end function patch_moments_of
+
    !> What a patch sees at both ends of a step.
    pure function patch_look(patch, x, dx) result(look)
       type(patch_t), intent(in) :: patch         !! that looks
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
       type(patch_look_t) :: look
-      real(wp) :: place(3, patch%n_vertex, 0:1)
+      type(patch_start_t) :: start
 
-      call place_vertices(patch, x, place(:, :, 0))
-      call place_vertices(patch, x + dx, place(:, :, 1))
-      call find_means(patch, place(:, :, 0), look%height(0), look%cover(0))
-      call find_means(patch, place(:, :, 1), look%height(1), look%cover(1))
-      look%way = longest_way(patch, x, place)
-      look%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+      if (allocated(patch%start)) then
+         call look_from(patch, patch%start, x, dx, look)
+      else
+         call patch_begin(patch, x, start)
+         call look_from(patch, start, x, dx, look)
+      end if
    end function patch_look
+
+   pure subroutine look_from(patch, start, x, dx, look)
+      type(patch_t), intent(in) :: patch
+      type(patch_start_t), intent(in) :: start
+      real(wp), intent(in) :: x(:, :), dx(:, :)
+      type(patch_look_t), intent(inout) :: look
+      real(wp) :: place(3, patch%n_vertex, 0:1)
+      logical :: is_seen(patch%n_triangle)
+
+      place(:, :, 0) = start%place
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      call patch_sees(patch, start, place(:, :, 1), is_seen)
+      call find_means(patch, start%number > 0, place(:, :, 0), look%height(0), look%cover(0))
+      call find_means(patch, is_seen, place(:, :, 1), look%height(1), look%cover(1))
+      look%way = longest_way(patch, x, place)
+      look%ahead = height_ahead(patch, is_seen, place(:, :, 0))
+   end subroutine look_from
 
    !> What each triangle covers of what is covered of a patch at one configuration.
    pure function patch_shares(patch, x) result(share)
@@ -123,21 +214,40 @@ contains
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
       logical, intent(in) :: knows_start         !! `basis` is of this patch, from the same start
       type(patch_basis_t), intent(inout) :: basis
-      real(wp) :: place(3, patch%n_vertex, 0:1)
+      type(patch_start_t) :: start
 
-      call place_vertices(patch, x, place(:, :, 0))
-      call place_vertices(patch, x + dx, place(:, :, 1))
-      if (.not. knows_start) call find_basis(patch, frame_size(x(:, :3)), place(:, :, 0), &
-         basis%height(:, 0), basis%cover(:, 0), basis%area(0))
-      call find_basis(patch, frame_size(x(:, :3) + dx(:, :3)), place(:, :, 1), &
-         basis%height(:, 1), basis%cover(:, 1), basis%area(1))
-      basis%way = longest_way(patch, x, place)
-      basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+      if (allocated(patch%start)) then
+         call basis_from(patch, patch%start, x, dx, knows_start, basis)
+      else
+         call patch_begin(patch, x, start)
+         call basis_from(patch, start, x, dx, knows_start, basis)
+      end if
    end subroutine patch_basis
 
-   !> The same at one configuration.
-   pure subroutine find_basis(patch, size_of, place, height, cover, area)
+   pure subroutine basis_from(patch, start, x, dx, knows_start, basis)
       type(patch_t), intent(in) :: patch
+      type(patch_start_t), intent(in) :: start
+      real(wp), intent(in) :: x(:, :), dx(:, :)
+      logical, intent(in) :: knows_start
+      type(patch_basis_t), intent(inout) :: basis
+      real(wp) :: place(3, patch%n_vertex, 0:1)
+      logical :: is_seen(patch%n_triangle)
+
+      place(:, :, 0) = start%place
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      call patch_sees(patch, start, place(:, :, 1), is_seen)
+      if (.not. knows_start) call find_basis(patch, start%number > 0, frame_size(x(:, :3)), &
+         place(:, :, 0), basis%height(:, 0), basis%cover(:, 0), basis%area(0))
+      call find_basis(patch, is_seen, frame_size(x(:, :3) + dx(:, :3)), place(:, :, 1), &
+         basis%height(:, 1), basis%cover(:, 1), basis%area(1))
+      basis%way = longest_way(patch, x, place)
+      basis%ahead = height_ahead(patch, is_seen, place(:, :, 0))
+   end subroutine basis_from
+
+   !> The same at one configuration.
+   pure subroutine find_basis(patch, is_seen, size_of, place, height, cover, area)
+      type(patch_t), intent(in) :: patch
+      logical, intent(in) :: is_seen(:)          !! (n_triangle)
       real(wp), intent(in) :: size_of            !! of the frame [L^2]
       real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
       real(wp), intent(out) :: height(3), cover(3), area
@@ -148,6 +258,7 @@ contains
       height = 0.0_wp
       cover = 0.0_wp
       do k = 1, patch%n_triangle
+         if (.not. is_seen(k)) cycle
          associate (t => patch%triangle(:, k))
             corner = place(:2, t)
             products = patch_products(patch%area, corner)
@@ -184,8 +295,9 @@ contains
    end function longest_way
 
    !> The integral of chi times height over the patch by its area, and what of it is covered.
-   pure subroutine find_means(patch, place, height, cover)
+   pure subroutine find_means(patch, is_seen, place, height, cover)
       type(patch_t), intent(in) :: patch
+      logical, intent(in) :: is_seen(:)          !! (n_triangle)
       real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
       real(wp), intent(out) :: height, cover
       real(wp) :: moment(3), share(3), corner(2, 3)
@@ -194,9 +306,9 @@ contains
       height = 0.0_wp
       cover = 0.0_wp
       do k = 1, patch%n_triangle
+         if (.not. is_seen(k)) cycle
          associate (t => patch%triangle(:, k))
             corner = place(:2, t)
-            if (patch_misses(patch%area, corner)) cycle
             moment = patch_moments(patch%area, corner)
             do v = 1, 3
                share = moment(v)*barycentric(corner, unit_corner(:, v))
@@ -209,17 +321,17 @@ contains
 
    !> How high the planes of the triangles that are over the patch at the end are over it at the
    !> start: the least; huge if there are none [L].
-   pure real(wp) function height_ahead(patch, from, to) result(least)
+   pure real(wp) function height_ahead(patch, is_seen, from) result(least)
       type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: from(:, :), to(:, :)   !! (3, n_vertex)
+      logical, intent(in) :: is_seen(:)          !! (n_triangle) at the end
+      real(wp), intent(in) :: from(:, :)         !! (3, n_vertex)
       real(wp) :: corner(2, 3)
       integer :: k
 
       least = huge(least)
       do k = 1, patch%n_triangle
+         if (.not. is_seen(k)) cycle
          associate (t => patch%triangle(:, k), centre => patch%area%centre)
-            corner = to(:2, t)
-            if (patch_misses(patch%area, corner)) cycle
             if (any(patch%chi(t) <= 0.0_wp)) cycle
             corner = from(:2, t)
             least = min(least, dot_product(barycentric(corner, [centre, centre]), from(3, t)))

@@ -8,7 +8,7 @@ module emcon_patch_stencil_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
-   use emcon_patch_look_space, only : patch_t
+   use emcon_patch_look_space, only : patch_begin, patch_t
    use emcon_patch_moments_space, only : patch_triangle
    use emcon_patch_near_space, only : narrow_flange, patch_near_find, patch_near_goes_on, &
       patch_near_list, patch_near_nearest, patch_near_pass, patch_near_t, patch_scope_t, &
@@ -19,7 +19,8 @@ module emcon_patch_stencil_space
    use emcon_sort, only : unique_sorted
    implicit none
    private
-   public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather, patch_stencil_height
+   public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather, patch_stencil_height, &
+      patch_stencil_begin
 
    !> Sides of the patch, by the shorter of the facets of both sides.
    real(wp), parameter :: patch_size = 0.07_wp
@@ -74,6 +75,7 @@ contains
       integer :: i, nearest
 
       self%triangle = 0
+      if (allocated(self%patch%start)) deallocate(self%patch%start)
       if (size(scope%facet) == 0) return
       i = sides%frames%point(frame)
       call patch_near_find(near, sides, i, scope, x, u)
@@ -102,6 +104,23 @@ contains
       end if
       call make_patch(self, sides, frame, near, x, u)
    end subroutine patch_stencil_choose
+
+   !> Keep what the patch sees as a step begins from x + u0, if stencils were chosen there.
+   pure subroutine patch_stencil_begin(self, x, u0, is_chosen)
+      type(patch_stencil_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      logical, intent(in) :: is_chosen           !! they were; else nothing is kept
+      real(wp), dimension(3, 3 + self%patch%n_vertex) :: at, way
+
+      if (self%triangle == 0) return
+      if (is_chosen .and. .not. allocated(self%patch%start)) then
+         allocate(self%patch%start)
+         call patch_stencil_gather(self, x, u0, u0, at, way)
+         call patch_begin(self%patch, at, self%patch%start)
+      else if (allocated(self%patch%start) .and. .not. is_chosen) then
+         deallocate(self%patch%start)
+      end if
+   end subroutine patch_stencil_begin
 
    !> The vertices and triangles of the patch with their nodes.
    pure subroutine make_patch(self, sides, frame, near, x, u)

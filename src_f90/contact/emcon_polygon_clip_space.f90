@@ -7,7 +7,7 @@ module emcon_polygon_clip_space
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: polygon_clip, polygon_misses, polygon_inside, barycentric
+   public :: polygon_clip, polygon_misses, polygon_beside, polygon_inside, barycentric
    public :: triangle_sides, square_sides, most_corners
 
    !> The triangle 0 <= y1, y2, y1 + y2 <= 1, and the square 0 <= y1, y2 <= 1.
@@ -43,6 +43,18 @@ contains
       end do
       misses = .false.
    end function polygon_misses
+
+   !> How far outside of one of the sides the triangle is, at most; 0: of none.
+   pure real(wp) function polygon_beside(sides, corner) result(beside)
+      real(wp), intent(in) :: sides(:, :)        !! (3, n_side)
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
+      integer :: i, k
+
+      beside = 0.0_wp
+      do k = 1, size(sides, 2)
+         beside = max(beside, -maxval([(polygon_inside(sides(:, k), corner(:, i)), i = 1, 3)]))
+      end do
+   end function polygon_beside
 
    !> The common polygon, in turn as the corners of the triangle.
    pure subroutine polygon_clip(sides, corner, polygon, n)

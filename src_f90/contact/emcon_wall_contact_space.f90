@@ -22,7 +22,7 @@ module emcon_wall_contact_space
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
    use emcon_wall_gap_space, only : dg_t, wall_gap, wall_gap_nodes
-   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_t
+   use emcon_wall_slip_space, only : n_wall_point, wall_axis, wall_slip, wall_slip_t
    implicit none
    private
    public :: wall_contact_t, wall_contact_init
@@ -326,15 +326,6 @@ contains
       way(:, 2:) = du(:, self%wall%node)
    end subroutine gather
 
-   !> Vector `k` of the wall in its vectors.
-   pure function axis_of(k) result(axis)
-      integer, intent(in) :: k                   !! 1 to 3
-      real(wp) :: axis(3)
-
-      axis = 0.0_wp
-      axis(k) = 1.0_wp
-   end function axis_of
-
    !> As `contact_t` has it.
    pure function wall_slip_over(self, i, x, u0, du) result(slip)
       class(wall_contact_t), intent(in) :: self
@@ -345,7 +336,7 @@ contains
       type(wall_slip_t) :: over
 
       call gather(self, i, x, u0, du, at, way)
-      call wall_slip(self%wall, at, way, axis_of(self%along(i)), .true., over)
+      call wall_slip(self%wall, at, way, wall_axis(self%along(i)), .true., over)
       slip = over%f
    end function wall_slip_over
 
@@ -369,10 +360,10 @@ contains
       item%node(:m + n - 1) = [node(:m), self%wall%node(:n - 1)]
       g = 0.0_wp
       c = 0.0_wp
-      h = 0.0_wp
       associate (in_order => [(k, k = 1, n_of_gap)])
          call nodes_add_first(1.0_wp, gap%g, in_order, g)
          call nodes_add_first(1.0_wp, gap%c, in_order, c)
+         if (.not. item%leaves_second) h = 0.0_wp
          if (.not. item%leaves_second) call nodes_add_second(1.0_wp, n_dim, gap%h, in_order, h)
       end associate
       associate (share => [weight(:m), (1.0_wp, k = 2, n)])
@@ -392,7 +383,7 @@ contains
       real(wp) :: weight(max_face_nodes)
       integer :: k, m, n, s, node(max_face_nodes)
 
-      call wall_slip(self%wall, at, way, axis_of(self%along(i)), item%leaves_second, slip)
+      call wall_slip(self%wall, at, way, wall_axis(self%along(i)), item%leaves_second, slip)
       call find_parts(self, i, m, node, weight)
       call condition_resize_slip(item)
       n = item%n_node

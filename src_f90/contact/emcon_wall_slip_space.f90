@@ -4,17 +4,13 @@
 !> that touch the wall half way are slip. So rigid turns of wall and point together are none, and
 !> its forces have no resultant and no moment. Source: docs/theory.md, section 14.3.
 module emcon_wall_slip_space
-   use emcon_dgrad9, only : dg_dot, dg_t, difference, operator(*)
-   use emcon_dgrad9_first, only : first_dot => dg_dot, first_t => dg_t, &
-      first_difference => difference, operator(*)
-   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_frame_slip_space, only : tangent_axis, tangent_basis
    use emcon_kinds, only : wp
    use emcon_wall, only : wall_t
    use emcon_wall_distance_space, only : wall_bend, wall_find, wall_spot_t
    implicit none
    private
-   public :: wall_slip_t, wall_slip, n_wall_point
+   public :: wall_slip_t, wall_slip, wall_axis, n_wall_point
 
    !> The point, and the origin and tips of vectors of the wall.
    integer, parameter :: n_wall_point = 5, n_dim = 3
@@ -27,6 +23,14 @@ module emcon_wall_slip_space
       real(wp) :: h(n_dim*n_wall_point, n_dim*n_wall_point, 2)
    end type wall_slip_t
 
+   !> The coordinates of a point in the vectors of a wall over a step: the way to it from the origin
+   !> times each of them.
+   type :: places_t
+      real(wp), dimension(n_dim) :: start, change !! [L]
+      real(wp), dimension(n_dim) :: mean_way, end_way    !! by the length of vectors
+      real(wp), dimension(n_dim, n_dim) :: mean_vector, end_vector   !! of length 1
+   end type places_t
+
 contains
 
    !> The first direction is as near to `along` as it can be.
@@ -37,74 +41,111 @@ contains
       real(wp), intent(in) :: along(n_dim)       !! in the vectors of the wall, of any length
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(wall_slip_t), intent(out) :: slip
-      type(dg_t) :: place(n_dim)
-      type(first_t) :: first
-      real(wp) :: basis(n_dim, 2), by_place(n_dim, n_dim, 2), part_g(n_dim, n_wall_point), &
-         part_c(n_dim, n_wall_point)
+      type(places_t) :: place
+      real(wp) :: basis(n_dim, 2), by_place(n_dim, n_dim, 2), weight(n_dim)
       integer :: i, k
 
-      do i = 1, n_dim
-         associate (three => [1, 2, 2 + i, 2 + i])
-            if (leaves_second) then
-               first = (1.0_wp/wall%arm)*first_dot(first_difference(1, 2, x(:, three), &
-                  dx(:, three)), first_difference(3, 2, x(:, three), dx(:, three)))
-               place(i)%f0 = first%f0
-               place(i)%df = first%df
-               place(i)%g = first%g
-               place(i)%c = first%c
-            else
-               place(i) = (1.0_wp/wall%arm)*dg_dot(difference(1, 2, x(:, three), dx(:, three)), &
-                  difference(3, 2, x(:, three), dx(:, three)))
-            end if
-         end associate
-      end do
-      call find_basis(wall, place%f0 + 0.5_wp*place%df, along, basis, by_place)
-      do i = 1, n_dim
-         part_g = 0.0_wp
-         part_c = 0.0_wp
-         call nodes_add_first(1.0_wp, place(i)%g, points_of(i), part_g)
-         call nodes_add_first(1.0_wp, place(i)%c, points_of(i), part_c)
-         do k = 1, 2
-            slip%f(k) = slip%f(k) + basis(i, k)*place(i)%df
-            slip%g(:, :, k) = slip%g(:, :, k) + basis(i, k)*part_g
-            ! The directions turn with the place at the end.
-            slip%c(:, :, k) = slip%c(:, :, k) + (basis(i, k) + dot_product(place%df, &
-               by_place(:, i, k)))*part_c
+      place = places_of(wall, x, dx)
+      call find_basis(wall, place%start + 0.5_wp*place%change, along, basis, by_place)
+      do k = 1, 2
+         slip%f(k) = dot_product(basis(:, k), place%change)
+         slip%g(:, :, k) = sum_of(basis(:, k), place%mean_way, place%mean_vector)
+         ! The directions turn with the place at the end.
+         do i = 1, n_dim
+            weight(i) = basis(i, k) + dot_product(place%change, by_place(:, i, k))
          end do
+         slip%c(:, :, k) = sum_of(weight, place%end_way, place%end_vector)
       end do
-      if (.not. leaves_second) call add_second(place, basis, by_place, slip)
+      if (.not. leaves_second) call add_second(wall, place, basis, by_place, slip)
    end subroutine wall_slip
 
-   !> The points that coordinate `i` is made of.
-   pure function points_of(i) result(point)
-      integer, intent(in) :: i
-      integer :: point(3)
+   !> Where the point is in the vectors of the wall.
+   pure type(places_t) function places_of(wall, x, dx) result(place)
+      type(wall_t), intent(in) :: wall
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! as `wall_slip` has them
+      real(wp), dimension(n_dim) :: way, change, vector, turn
+      integer :: i
 
-      point = [1, 2, 2 + i]
-   end function points_of
+      way = x(:, 1) - x(:, 2)
+      change = dx(:, 1) - dx(:, 2)
+      place%end_way = (way + change)/wall%arm
+      place%mean_way = (way + 0.5_wp*change)/wall%arm
+      do i = 1, n_dim
+         vector = x(:, 2 + i) - x(:, 2)
+         turn = dx(:, 2 + i) - dx(:, 2)
+         place%end_vector(:, i) = (vector + turn)/wall%arm
+         place%mean_vector(:, i) = (vector + 0.5_wp*turn)/wall%arm
+         place%start(i) = dot_product(way, vector)/wall%arm
+         place%change(i) = dot_product(change, place%mean_vector(:, i)) &
+            + dot_product(turn, place%mean_way)
+      end do
+   end function places_of
 
-   pure subroutine add_second(place, basis, by_place, slip)
-      type(dg_t), intent(in) :: place(:)
+   !> Derivatives by all points of a sum of the dot products, from those by the way and the vectors.
+   pure function sum_of(weight, way, vector) result(by)
+      real(wp), intent(in) :: weight(n_dim)      !! of each
+      real(wp), intent(in) :: way(n_dim)         !! by each vector
+      real(wp), intent(in) :: vector(n_dim, n_dim)   !! by the way
+      real(wp) :: by(n_dim, n_wall_point)
+      integer :: i
+
+      by(:, 1) = 0.0_wp
+      do i = 1, n_dim
+         by(:, 1) = by(:, 1) + weight(i)*vector(:, i)
+         by(:, 2 + i) = weight(i)*way
+      end do
+      by(:, 2) = -(by(:, 1) + sum(weight)*way)
+   end function sum_of
+
+   !> Of dot products, and of directions that turn with the place at the end.
+   pure subroutine add_second(wall, place, basis, by_place, slip)
+      type(wall_t), intent(in) :: wall
+      type(places_t), intent(in) :: place
       real(wp), intent(in) :: basis(:, :), by_place(:, :, :)   !! as `find_basis` has them
       type(wall_slip_t), intent(inout) :: slip
       real(wp), dimension(n_dim, n_wall_point) :: part, turn
-      integer :: i, j, k
+      real(wp) :: half
+      integer :: a, b, i, j, k
 
       slip%h = 0.0_wp
       do k = 1, 2
          do i = 1, n_dim
-            call nodes_add_second(basis(i, k), n_dim, place(i)%h, points_of(i), slip%h(:, :, k))
-            part = 0.0_wp
-            turn = 0.0_wp
-            call nodes_add_first(1.0_wp, place(i)%g, points_of(i), part)
-            do j = 1, n_dim
-               call nodes_add_first(by_place(i, j, k), place(j)%c, points_of(j), turn)
+            half = 0.5_wp*basis(i, k)/wall%arm
+            do a = 1, n_dim
+               associate (h => slip%h(:, :, k), point => a, origin => n_dim + a, &
+                     tip => n_dim*(1 + i) + a)
+                  h(point, tip) = h(point, tip) + half
+                  h(tip, point) = h(tip, point) + half
+                  h(tip, origin) = h(tip, origin) - half
+                  h(origin, tip) = h(origin, tip) - half
+                  h(point, origin) = h(point, origin) - half
+                  h(origin, point) = h(origin, point) - half
+                  h(origin, origin) = h(origin, origin) + 2.0_wp*half
+               end associate
             end do
-            slip%h(:, :, k) = slip%h(:, :, k) + spread(reshape(part, [size(part)]), 2, size(turn)) &
-               *spread(reshape(turn, [size(turn)]), 1, size(part))
+            part = sum_of(wall_axis(i), place%mean_way, place%mean_vector)
+            turn = sum_of(by_place(i, :, k), place%end_way, place%end_vector)
+            do j = 1, n_wall_point
+               do b = 1, n_dim
+                  do a = 1, n_wall_point
+                     associate (rows => slip%h(n_dim*(a - 1) + 1:n_dim*a, n_dim*(j - 1) + b, k))
+                        rows = rows + turn(b, j)*part(:, a)
+                     end associate
+                  end do
+               end do
+            end do
          end do
       end do
    end subroutine add_second
+
+   !> Vector `i` of the wall in its vectors.
+   pure function wall_axis(i) result(axis)
+      integer, intent(in) :: i                   !! 1 to 3
+      real(wp) :: axis(n_dim)
+
+      axis = 0.0_wp
+      axis(i) = 1.0_wp
+   end function wall_axis
 
    !> Origin and tips of the wall in its vectors.
    pure function own_vectors(wall) result(own)

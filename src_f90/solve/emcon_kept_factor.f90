@@ -7,11 +7,12 @@
 !>    dq = L^-T (y + W mu),  y = -L^-1 r,  W^T W mu = -defect - W^T y
 !>
 !> which is zero only where residual and defects are: the age of L makes the way longer, not its
-!> end another one. Source: docs/theory.md, section 8.
+!> end another one. Where contacts slide in space their forces are along F, not along G: there it is
+!> V = L^-1 F^T that mu pushes by. Source: docs/theory.md, section 8.
 module emcon_kept_factor
    use emcon_constraint, only : condition_t, most_slips
    use emcon_constraints, only : constraint_set_t
-   use emcon_csr, only : csr_find, csr_pick_rows, csr_t
+   use emcon_csr, only : csr_append, csr_find, csr_pick_rows, csr_t
    use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, &
       blocks_has_panels, blocks_reach, blocks_reach_rows, blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
@@ -19,7 +20,8 @@ module emcon_kept_factor
       factor_rows_make_room, factor_rows_subtract_products, factor_rows_t
    use emcon_gram_rows, only : gram_rows_free, gram_rows_take
    use emcon_kinds, only : dp, wp
-   use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
+   use emcon_lapack, only : dense_cholesky, dense_cholesky_solve, dense_lu, dense_lu_solve, &
+      dense_lu_t
    use emcon_memory, only : memory_factors, memory_go_on, memory_t, memory_take
    use emcon_numbering, only : numbering_t
    use emcon_projected_gradients, only : projected_begin, projected_gradients_t, projected_solve
@@ -50,8 +52,9 @@ module emcon_kept_factor
    !> Operations of a row condensed by iterations, for each entry of the matrix: two times as many
    !> steps as a correction takes, beside which those of a complete factor are four times as fast.
    real(dp), parameter :: condensed_operations = 4.0_dp*14.0_dp*4.0_dp
-   !> From so many constraints on they go through factors of dense blocks together.
-   integer, parameter :: least_panels = 200
+   !> From so many constraints on they go through factors of dense blocks together: from fewer on
+   !> where there are three rows of one contact, or two, on the same unknowns.
+   integer, parameter :: least_panels = 200, least_alike = 16
    !> So many times the rows of a set are kept at most.
    real(dp), parameter :: most_pool = 1.5_dp
 
@@ -66,6 +69,7 @@ module emcon_kept_factor
       integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
       type(factor_rows_t), private :: rows           !! the constraints last taken
+      type(dense_lu_t), private :: lu                !! W^T V of these, where forces have own rows
       !> Where the factor is incomplete:
       type(projected_gradients_t), allocatable, private :: gradients
       ! Of contacts that give way: W^T W, and what is added to its diagonal
@@ -198,6 +202,7 @@ contains
       logical, intent(in) :: is_exact            !! at these: no other correction follows
       logical, intent(out) :: is_fit             !! there is a factor, and one of W^T W, not t
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_aside                        ! forces have rows of their own
 
       is_fit = self%is_made .and. kept_factor_has_room(self, set%n_row, self%n_slot) &
          .and. .not. (self%blocks%is_incomplete .and. set%penalty%is_on)
@@ -209,9 +214,16 @@ contains
          return
       end if
       if (is_exact) call kept_factor_forget_rows(self)
-      call reach_rows(self, set, condensed_accuracy, error)
+      is_aside = .not. (is_exact .or. set%penalty%is_on)
+      if (is_aside) is_aside = pushes_aside(set)
+      call reach_rows(self, set, is_aside, condensed_accuracy, error)
       if (allocated(error)) return
-      if (set%penalty%is_on) then
+      if (is_aside) then
+         associate (n => set%n_row)
+            call dense_lu(transpose(self%rows%l(n + 1:, :n)), self%lu, is_fit)
+         end associate
+         is_fit = .not. is_fit
+      else if (set%penalty%is_on) then
          self%product = self%rows%l
          self%compliance = spread(0.0_dp, 1, set%n_row)
          call add_penalty(self, set, is_fit)
@@ -219,6 +231,21 @@ contains
          call dense_cholesky(self%rows%l, is_fit)
       end if
    end subroutine kept_factor_take
+
+   !> Does some contact slide where slip has a direction? Its force is not along its gradient.
+   pure logical function pushes_aside(set)
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      pushes_aside = .false.
+      do k = set%n_permanent + 1, set%n
+         associate (item => set%item(k))
+            if (.not. item%has_friction .or. .not. allocated(item%t)) cycle
+            pushes_aside = pushes_aside .or. (size(item%t, 3) == most_slips .and. &
+               any(abs(item%response%mu_sigma) > 0.0_wp))
+         end associate
+      end do
+   end function pushes_aside
 
    !> The constraints of `set` in their multipliers alone, by the factor there is: their values
    !> after a correction are free + w lam. By an incomplete factor both have some digits.
@@ -236,7 +263,7 @@ contains
          call condense_by_solutions(self, set, w, free, error)
          return
       end if
-      call reach_rows(self, set, condensed_accuracy, error)
+      call reach_rows(self, set, .false., condensed_accuracy, error)
       if (allocated(error)) return
       do k = 1, set%n_row
          w(k:, k) = real(self%blocks%scale*self%rows%l(k:, k), wp)
@@ -342,32 +369,58 @@ contains
    end subroutine multiply_rows
 
    !> W of the constraints, and W^T W, at gradients that are `part` off at most.
-   subroutine reach_rows(self, set, part, error)
+   subroutine reach_rows(self, set, is_aside, part, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor
       type(constraint_set_t), intent(in) :: set
+      logical, intent(in) :: is_aside            !! also V of their forces, and V^T W alone
       real(dp), intent(in) :: part               !! by which gradients of rows may be others
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, n
+      integer :: least, n_push
 
-      call factor_rows_begin(self%rows, set%n_row)
+      n_push = merge(set%n_row, 0, is_aside)
+      call factor_rows_begin(self%rows, set%n_row + n_push, n_push)
       call begin_rows(self, set%n_row)
-      if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
+      least = merge(least_alike, least_panels, is_aside .or. slips_turn(set))
+      if (set%n_row >= least .and. blocks_has_panels(self%blocks)) then
          call reach_panels(self, set, part, error)
          return
       end if
-      self%n_forward = self%n_forward + set%n_row
-      do k = 1, set%n_row
-         call factor_rows_make_room(self%rows, self%rows%start(k) + size(self%y))
-         associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
-               last => set%gap_rows%row_start(k + 1), at => self%rows%start(k) + 1)
-            call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), n, &
-               self%rows%index(at:), self%rows%w(at:), error)
-         end associate
-         if (allocated(error)) return
-         self%rows%start(k + 1) = self%rows%start(k) + n
-      end do
-      call factor_rows_fill_products(self%rows, self%y)
+      self%n_forward = self%n_forward + self%rows%n
+      call reach_by_row(self, set%gap_rows, set%n_row, 0, error)
+      if (allocated(error)) return
+      if (is_aside) call reach_by_row(self, set%force_rows, n_push, set%n_row, error)
+      if (.not. allocated(error)) call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
+
+   !> Has the set rows of slips that have a direction?
+   pure logical function slips_turn(set)
+      type(constraint_set_t), intent(in) :: set
+
+      slips_turn = allocated(set%slip)           ! conditions of explicit steps have no slips
+      if (slips_turn) slips_turn = any(set%slip(:min(set%n_row, size(set%slip))) == most_slips)
+   end function slips_turn
+
+   !> The first `n` of `rows`, row by row, behind those that are there.
+   subroutine reach_by_row(self, rows, n, before, error)
+      type(kept_factor_t), intent(inout) :: self
+      type(csr_t), intent(in) :: rows            !! of unknowns
+      integer, intent(in) :: n, before           !! of rows
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, n_entry
+
+      do k = 1, n
+         associate (start => self%rows%start, first => rows%row_start(k) + 1, &
+               last => rows%row_start(k + 1))
+            call factor_rows_make_room(self%rows, start(before + k) + size(self%y))
+            associate (at => start(before + k) + 1)
+               call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), &
+                  n_entry, self%rows%index(at:), self%rows%w(at:), error)
+            end associate
+            if (allocated(error)) return
+            start(before + k + 1) = start(before + k) + n_entry
+         end associate
+      end do
+   end subroutine reach_by_row
 
    !> Nothing is known of `n` rows yet.
    pure subroutine begin_rows(self, n)
@@ -390,20 +443,25 @@ contains
       real(dp), intent(in) :: part
       type(error_t), allocatable, intent(out) :: error
       type(row_panel_t), allocatable :: panel(:)
-      type(csr_t) :: rows
-      integer :: name(set%n_row)
+      type(csr_t) :: all, rows
+      integer :: name(self%rows%n)
       integer, allocatable :: missing(:)
 
-      associate (pool => self%rows%pool)
-         name = (1 + most_slips)*set%id(set%condition) + set%slip + 1
-         call row_pool_find(pool, name, set%gap_rows, part, missing)
+      associate (pool => self%rows%pool, n => set%n_row)
+         name(:n) = 2*((1 + most_slips)*set%id(set%condition) + set%slip) + 1
+         all = set%gap_rows
+         if (self%rows%n_push > 0) then
+            name(n + 1:) = name(:n) + 1
+            call csr_append(all, set%force_rows, n)
+         end if
+         call row_pool_find(pool, name, all, part, missing)
          if (size(missing) > 0 .and. real(pool%n + size(missing), dp) &
-            > most_pool*set%n_row) then
+            > most_pool*self%rows%n) then
             call row_pool_forget(pool)
-            call row_pool_find(pool, name, set%gap_rows, part, missing)
+            call row_pool_find(pool, name, all, part, missing)
          end if
          if (size(missing) > 0) then
-            call csr_pick_rows(set%gap_rows, missing, rows)
+            call csr_pick_rows(all, missing, rows)
             call blocks_reach_rows(self%blocks, rows, size(missing), panel, error)
             if (allocated(error)) return
             call row_pool_append(pool, name, rows, missing, panel)
@@ -536,7 +594,11 @@ contains
             + self%compliance(k)*real(set%penalty%lack(k), dp)
       end do
       call factor_rows_subtract_products(self%rows, self%y, self%mu)
-      call dense_cholesky_solve(self%rows%l, self%mu)
+      if (self%rows%n_push > 0) then
+         call dense_lu_solve(self%lu, self%mu)
+      else
+         call dense_cholesky_solve(self%rows%l, self%mu)
+      end if
       call factor_rows_add(self%rows, self%mu, self%y)
       call blocks_solve(self%blocks, .true., self%y, self%x, error)
       if (allocated(error)) return

@@ -120,24 +120,26 @@ contains
    subroutine row_pool_subtract_products(self, y, mu)
       type(row_pool_t), intent(in) :: self
       real(dp), intent(in), contiguous :: y(:)   !! (n_unknown) in the order of L
-      real(dp), intent(inout) :: mu(:)           !! (n) of the set
+      real(dp), intent(inout) :: mu(:)           !! of the first rows of the set
       real(dp) :: all_mu(self%n)
 
       all_mu = 0.0_dp
-      all_mu(self%place) = mu
-      call panels_subtract_products(self%panel, y, all_mu)
-      mu = all_mu(self%place)
+      associate (place => self%place(:size(mu)))
+         all_mu(place) = mu
+         call panels_subtract_products(self%panel, y, all_mu)
+         mu = all_mu(place)
+      end associate
    end subroutine row_pool_subtract_products
 
    !> y = y + W mu
    subroutine row_pool_add(self, mu, y)
       type(row_pool_t), intent(in) :: self
-      real(dp), intent(in) :: mu(:)              !! (n) of the set
+      real(dp), intent(in) :: mu(:)              !! of the last rows of the set
       real(dp), intent(inout), contiguous :: y(:)    !! (n_unknown) in the order of L
       real(dp) :: all_mu(self%n)
 
       all_mu = 0.0_dp
-      all_mu(self%place) = mu
+      all_mu(self%place(size(self%place) - size(mu) + 1:)) = mu
       call panels_add(self%panel, all_mu, y)
    end subroutine row_pool_add
 

@@ -1,6 +1,7 @@
 !> Corrections by a kept factor: those of the saddle point, for the matrix and rows it was made of.
 module test_kept_factor
    use check, only : check_near, check_true, test_case_t
+   use emcon_constraint_rows, only : constraints_rows
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_correct, kept_factor_free, &
@@ -10,6 +11,7 @@ module test_kept_factor
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : find_solver_row, solver_default, solver_row, solver_row_t
    use random_constraints, only : make_problem, make_symmetric, problem_t, tol_dp
+   use small_scenes, only : shake
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -22,6 +24,7 @@ contains
 
       tests = [ &
          test_case_t("the correction of the saddle point", test_correction), &
+         test_case_t("the same with forces beside the gradients", test_aside), &
          test_case_t("the same by iterations", test_iterations), &
          test_case_t("no correction where nothing is left", test_fixed_point), &
          test_case_t("multipliers of contacts that give way are unknowns too", test_soft), &
@@ -61,6 +64,50 @@ contains
       call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq")
       call kept_factor_free(kept)
    end subroutine test_correction
+
+   !> [K, F^T; G, 0] [dq; -mu] = -[r; c] by LAPACK: two contacts slide in two directions.
+   subroutine test_aside(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(dp), allocatable :: full(:, :), rhs(:, :), x(:, :)
+      real(wp), allocatable :: dq(:)
+      logical :: is_fit, is_singular
+      integer :: k, n, m
+
+      call make_symmetric(problem)
+      problem%set%n_permanent = 0
+      do k = 2, 5, 3
+         associate (item => problem%set%item(k))
+            allocate(item%t(2, size(item%node), 2), item%t1(2, size(item%node), 2))
+            call shake(item%t(:, :, 1), 1.0_wp)
+            call shake(item%t(:, :, 2), 1.0_wp)
+            item%t1 = item%t
+            item%has_friction = .true.
+            item%response%mu_sigma = [0.3_wp, -0.2_wp]
+         end associate
+      end do
+      call constraints_rows(problem%set, problem%numbering)
+      call kept_factor_set_up(kept, solver_default)
+      call kept_factor_renew(kept, problem%base, error)
+      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, .false., is_fit, error)
+      if (allocated(error)) return
+      call check_true(error, kept%is_made .and. is_fit, "there is a factor")
+      n = problem%numbering%n_unknown
+      m = problem%set%n
+      allocate(dq(n))
+      call kept_factor_correct(kept, problem%set, problem%residual, dq, error)
+      if (allocated(error)) return
+      allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+      full(:n, :n) = 0.5_dp*(dense_of(problem%base) + transpose(dense_of(problem%base)))
+      full(n + 1:, :n) = dense_of(problem%set%gap_rows)
+      full(:n, n + 1:) = transpose(dense_of(problem%set%force_rows))
+      rhs(:n, 1) = -real(problem%residual, dp)
+      rhs(n + 1:, 1) = -real(problem%set%defect, dp)
+      call dense_solve(full, rhs, x, is_singular)
+      call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq")
+      call kept_factor_free(kept)
+   end subroutine test_aside
 
    !> The same with an incomplete factor: asked for two digits it meets the constraints to
    !> round-off, corrections of what is left come to the end, and of many digits one is enough.
