@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,12 @@ __all__ = ["SOLIDS", "far_first", "is_seen", "outer_faces", "project"]
 
 #: Direction that the bodies are seen from [degrees]: around z from x, and up from there.
 AZIMUTH, ELEVATION = -60.0, 25.0
+
+#: A plane whose normal makes a smaller cosine with the direction of view is seen from its edge; a
+#: corner within this part of the size of a face is in its plane.
+LEAST_VIEW, LEAST_DEPTH = 1e-3, 1e-3
+#: Faces whose neighbours on paper are looked for at a time.
+BATCH = 1000
 
 #: Faces of a cell by its corners, as VTK counts them, of tetrahedra (4) and hexahedra (8).
 _FACES = {4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
@@ -61,9 +68,90 @@ def project(points: Array) -> tuple[Array, Array]:
     return seen[:, :2], seen[:, 2]
 
 
-def far_first(faces: Sequence[NDArray[np.int64]], near: Array) -> NDArray[np.int64]:
-    """Numbers of the faces, the farthest first: what is drawn later covers what is behind."""
-    return np.argsort([near[face].mean() for face in faces], kind="stable")
+def far_first(faces: Sequence[NDArray[np.int64]], seen: Array, near: Array) -> NDArray[np.int64]:
+    """Numbers of the faces, the farthest first: what is drawn later covers what is behind.
+
+    seen, near      places on paper (n, 2) and how near they are (n), of all points
+    By the nearness of their middles, but for faces that meet on paper: there one that lies behind
+    the plane of the other is drawn before it, however their middles lie. Where that goes in a
+    circle middles decide.
+    """
+    if not len(faces):
+        return np.zeros(0, dtype=np.int64)
+    middle = np.array([near[face].mean() for face in faces])
+    behind, before = _covers(faces, seen, near)
+    after: list[list[int]] = [[] for _ in faces]
+    waits = np.bincount(before, minlength=len(faces))
+    for one, other in zip(behind.tolist(), before.tolist(), strict=True):
+        after[one].append(other)
+    ready = [(depth, k) for k, depth in enumerate(middle.tolist()) if not waits[k]]
+    rest = iter(np.argsort(middle, kind="stable").tolist())
+    heapq.heapify(ready)
+    is_drawn = np.zeros(len(faces), dtype=bool)
+    order: list[int] = []
+    while len(order) < len(faces):
+        k = heapq.heappop(ready)[1] if ready else next(rest)
+        if is_drawn[k]:
+            continue
+        is_drawn[k] = True
+        order.append(k)
+        for other in after[k]:
+            waits[other] -= 1
+            if not waits[other] and not is_drawn[other]:
+                heapq.heappush(ready, (middle[other], other))
+    return np.array(order)
+
+
+def _covers(faces: Sequence[NDArray[np.int64]], seen: Array,
+            near: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of faces that may meet on paper, of which the first lies behind the plane of the second
+    or the second in front of that of the first."""
+    corner = np.array([face[[0, len(face)//_sides(face), 2*len(face)//_sides(face), -1]]
+                       if _sides(face) == 3 else face[::len(face)//4] for face in faces])
+    place = np.concatenate([seen[corner], near[corner][..., None]], axis=2)
+    one, other = _meeting(place[..., :2].min(axis=1), place[..., :2].max(axis=1))
+    normal = np.cross(place[:, 2] - place[:, 0], place[:, 3] - place[:, 1])
+    size = np.linalg.norm(normal, axis=1)
+    # Planes that stand on their edges say nothing; the others look at the eye.
+    is_plane = np.abs(normal[:, 2]) > LEAST_VIEW*size
+    normal *= np.sign(normal[:, 2:])
+    middle = place.mean(axis=1)
+    slack = LEAST_DEPTH*size**1.5
+
+    def heights(of: NDArray[np.int64], over: NDArray[np.int64]) -> Array:
+        heights: Array = np.einsum("nkd,nd->nk", place[of] - middle[over][:, None], normal[over])
+        return heights
+
+    pairs = []
+    for a, b in ((one, other), (other, one)):
+        is_behind = is_plane[b] & (heights(a, b) < slack[b][:, None]).all(axis=1)
+        is_covered = is_plane[a] & (heights(b, a) > -slack[a][:, None]).all(axis=1)
+        pairs.append((is_behind, is_covered))
+    first = (pairs[0][0] | pairs[0][1]) & ~(pairs[1][0] | pairs[1][1])
+    second = (pairs[1][0] | pairs[1][1]) & ~(pairs[0][0] | pairs[0][1])
+    return (np.concatenate([one[first], other[second]]), np.concatenate([other[first], one[second]]))
+
+
+def _sides(face: NDArray[np.int64]) -> int:
+    return 3 if len(face) in {3, 6} else 4
+
+
+def _meeting(low: Array, high: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of boxes on paper (n, 2) that overlap, each once."""
+    order = np.argsort(low[:, 0], kind="stable")
+    low, high = low[order], high[order]
+    last = np.searchsorted(low[:, 0], high[:, 0])
+    count = last - np.arange(len(low)) - 1
+    one, other = [], []
+    # Not all pairs at once: a wide picture of many faces would need much memory.
+    for begin in range(0, len(low), BATCH):
+        some = count[begin:begin + BATCH]
+        a = np.repeat(np.arange(begin, begin + len(some)), some)
+        b = a + 1 + np.arange(len(a)) - np.repeat(np.cumsum(some) - some, some)
+        meets = (low[a, 1] < high[b, 1]) & (low[b, 1] < high[a, 1])
+        one.append(a[meets])
+        other.append(b[meets])
+    return order[np.concatenate(one)], order[np.concatenate(other)]
 
 
 def is_seen(seen: Array, faces: Sequence[NDArray[np.int64]]) -> NDArray[np.bool_]:

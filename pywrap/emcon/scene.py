@@ -333,7 +333,7 @@ def _see(scene: Scene, place: Sequence[Array], of_faces: bool) -> None:
         scene.values = [values[cell_of] for values in scene.values]
     seen = [project(points) for points in place]
     scene.position = [on_paper for on_paper, _ in seen]
-    scene.order = [far_first(scene.cells, near) for _, near in seen]
+    scene.order = [far_first(scene.cells, *places) for places in seen]
 
 
 def _see_walls(scene: Scene, place: Sequence[Array], walls: Sequence[NDArray[np.int64]],
@@ -351,7 +351,7 @@ def _see_walls(scene: Scene, place: Sequence[Array], walls: Sequence[NDArray[np.
     scene.order = []
     for k, (bodies, wall) in enumerate(zip(place, points, strict=True)):
         scene.position[k], near = project(np.concatenate([bodies, wall]))
-        order = far_first(scene.cells, near)
+        order = far_first(scene.cells, scene.position[k], near)
         seen = np.concatenate([np.ones(n_face, dtype=bool),
                                is_seen(scene.position[k], scene.cells[n_face:])])
         scene.order.append(order[seen[order]])

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from matplotlib.path import Path as Polygon
 from scene_tools import DECKS, ROOT, run_deck
 
 sys.path += [str(ROOT/"pywrap"), str(ROOT/"tests"/"scenes")]
@@ -39,12 +40,33 @@ def test_what_is_near_is_drawn_last():
     """Of a cube the three faces that the eye sees cover the three others."""
     block = Block("C3D8", (1, 1, 1))
     faces, _ = outer_faces([np.array(block.element[0]) - 1])
-    _, near = project(block.x)
+    places = project(block.x)
     outward = [np.cross(block.x[f[1]] - block.x[f[0]], block.x[f[2]] - block.x[f[1]])
                for f in faces]
     seen = [normal @ basis()[2] > 0 for normal in outward]
     assert sum(seen) == 3
-    assert [seen[k] for k in far_first(faces, near)] == [False]*3 + [True]*3
+    assert [seen[k] for k in far_first(faces, *places)] == [False]*3 + [True]*3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_body_in_a_body_is_covered(kind):
+    """Of a fine block in a coarse one nothing is seen: over each point of its faces an outer face is drawn last."""
+    outer = Block(kind, (1, 2, 1), size=(4, 4, 4))
+    inner = Block(kind, (4, 3, 4), size=(3.8, 3.8, 3.8), place=lambda x: x + 0.1)
+    n = len(outer.x)
+    x = np.concatenate([outer.x, inner.x])
+    cells = [np.array(nodes) - 1 for nodes in outer.element] + [np.array(nodes) - 1 + n for nodes in inner.element]
+    faces, _ = outer_faces(cells)
+    seen, near = project(x)
+    order = far_first(faces, seen, near)
+    assert sorted(order) == list(range(len(faces)))
+    place = np.argsort(order)
+    is_outer = np.array([face.max() < n for face in faces])
+    for number in np.flatnonzero(~is_outer):
+        corner = seen[faces[number]]
+        for point in (corner.mean(axis=0), *(0.9*corner + 0.1*corner.mean(axis=0))):
+            over = [k for k, face in enumerate(faces) if Polygon(seen[face]).contains_point(point)]
+            assert is_outer[max(over, key=lambda k: place[k])]
 
 
 def test_projection_is_a_rotation():
