@@ -35,6 +35,8 @@ module emcon_mortar_space
 
    !> A node is let go where less than this part of its surface is covered.
    real(wp), parameter :: least_cover = 0.02_wp
+   !> Hard contact holds it where as much of that is over the master itself, not past its end.
+   real(wp), parameter :: least_own = 1.0e-3_wp
    !> So far, per facet, a mean gap may be closed where contact begins.
    real(wp), parameter :: max_penetration_mean = 0.2_wp
 
@@ -360,6 +362,9 @@ contains
          state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = area(0) < least
+         if (.not. self%step%has_compliance) then
+            state%is_over = state%is_over .and. any(comes_over(self, i))
+         end if
          if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset &
             - self%sagitta(i)
          if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset &
@@ -369,6 +374,23 @@ contains
          if (state%gap0 < -deepest - self%offset) state = gap_state_t(size=state%size)
       end associate
    end subroutine measure_vertex
+
+   !> Do the facets around constraint `i` come over the master itself, at the start and at the end?
+   !> By the shares of its vertex as they are on facets that are not covered: none is negative.
+   pure function comes_over(self, i) result(comes)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      logical :: comes(0:1)
+      real(wp) :: own(0:1)
+      integer :: k
+
+      own = 0.0_wp
+      do k = self%faces%start(i), self%faces%start(i + 1) - 1
+         own = own + matmul(mortar_slave_weight(self%faces, k, 0.0_wp), &
+            self%basis(self%faces%triangle(k))%own)
+      end do
+      comes = own >= least_own*self%whole(i)
+   end function comes_over
 
    pure subroutine mortar_evaluate(self, wanted, x, u0, du, target, item)
       class(mortar_space_t), intent(inout) :: self
