@@ -26,6 +26,7 @@ module emcon_mortar_space
       mortar_sight, sight_t
    use emcon_patch_gap_space, only : patch_sums_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
+   use emcon_patch_near_space, only : room_beside
    use emcon_patch_stencil_space, only : patch_stencil_gather
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
@@ -362,35 +363,49 @@ contains
          state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = area(0) < least
-         if (.not. self%step%has_compliance) then
-            state%is_over = state%is_over .and. any(comes_over(self, i))
-         end if
          if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset &
             - self%sagitta(i)
          if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset &
             - self%sagitta(i)
          if (state%is_arriving) state%was_open = &
             ahead - self%offset >= -max_penetration_on_entry*state%size
+         if (.not. self%step%has_compliance) call leave_beside(self, i, &
+            -merge(state%gap0, ahead - self%offset, area(0) > 0.0_wp), state)
          if (state%gap0 < -deepest - self%offset) state = gap_state_t(size=state%size)
       end associate
    end subroutine measure_vertex
 
-   !> Do the facets around constraint `i` come over the master itself, at the start and at the end?
-   !> By the shares of its vertex as they are on facets that are not covered: none is negative.
-   pure function comes_over(self, i) result(comes)
+   !> What part of constraint `i` is over the master itself, not past its end, at the start and at
+   !> the end. By the shares of its vertex as they are on facets that are not covered: none is
+   !> negative.
+   pure function over_master(self, i) result(part)
       type(mortar_space_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
-      logical :: comes(0:1)
-      real(wp) :: own(0:1)
+      real(wp) :: part(0:1)
       integer :: k
 
-      own = 0.0_wp
+      part = 0.0_wp
       do k = self%faces%start(i), self%faces%start(i + 1) - 1
-         own = own + matmul(mortar_slave_weight(self%faces, k, 0.0_wp), &
+         part = part + matmul(mortar_slave_weight(self%faces, k, 0.0_wp), &
             self%basis(self%faces%triangle(k))%own)
       end do
-      comes = own >= least_own*self%whole(i)
-   end function comes_over
+      part = part/self%whole(i)
+   end function over_master
+
+   !> Hard contact: what does not come over the master itself is not over it, and what begins deep
+   !> behind it, and farther than it reaches in beyond its end, is beside it: the way out is there.
+   pure subroutine leave_beside(self, i, depth, state)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in) :: depth              !! behind the master at the start [L]
+      type(gap_state_t), intent(inout) :: state
+      real(wp) :: part(0:1)
+
+      part = over_master(self, i)
+      state%is_over = state%is_over .and. maxval(part) >= least_own
+      if (depth > room_beside*min(state%size, state%other_size) .and. depth &
+         > part(0)*state%size) state = gap_state_t(size=state%size)
+   end subroutine leave_beside
 
    pure subroutine mortar_evaluate(self, wanted, x, u0, du, target, item)
       class(mortar_space_t), intent(inout) :: self

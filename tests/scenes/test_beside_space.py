@@ -41,7 +41,7 @@ def ran(folder: Path, text: str) -> tuple[Run, np.ndarray, np.ndarray]:
 
 # Depths from a few hundredths of the punch's elements to most of one.
 @pytest.mark.parametrize("depth", [0.012, 0.03, 0.05, 0.08, 0.2])
-@pytest.mark.parametrize("options", ["", ", SIDES=ONE", ", EDGES=NO"])
+@pytest.mark.parametrize("options", ["", ", SIDES=ONE", ", EDGES=NO", ", TYPE=MORTAR"])
 def test_the_side_is_pushed_and_only_when_it_is_met(tmp_path: Path, depth: float, options: str) -> None:
     _, way, force = ran(tmp_path, beside(depth, "*STATIC, DIRECT\n.04, 1.", options))
     assert np.abs(force[way < -0.001*WAY]).max() == 0.0
@@ -55,9 +55,10 @@ def test_the_side_is_pushed_and_only_when_it_is_met(tmp_path: Path, depth: float
     assert pushes[0] == pytest.approx(pushes[2]*way[first]/way[first + 2], rel=0.15)
 
 
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
 @pytest.mark.parametrize("more", ["", "*FRICTION\n.3\n"])
-def test_nothing_acts_across_the_gap_in_dynamics(tmp_path: Path, more: str) -> None:
-    run, way, force = ran(tmp_path, beside(0.05, "*DYNAMIC, DIRECT\n.02, 1.", more=more))
+def test_nothing_acts_across_the_gap_in_dynamics(tmp_path: Path, more: str, options: str) -> None:
+    run, way, force = ran(tmp_path, beside(0.05, "*DYNAMIC, DIRECT\n.02, 1.", options, more=more))
     # PERSISTENT contact acts across the last open gap at most, the way of one increment.
     assert np.abs(force[way < -0.02*WAY - 0.01*GAP]).max() == 0.0
     assert force[way > 0.0, 0].max() > 0.0
@@ -83,9 +84,10 @@ def test_a_cube_falls_past_a_table(tmp_path: Path, kind: str, options: str, cell
     assert max(np.abs(run.history[f"pair1_force_{a}"]).max() for a in "xyz") <= 1e-11
 
 
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
 @pytest.mark.parametrize("kind", ["C3D4", "C3D10", "C3D20"])
-def test_kinds_of_elements(tmp_path: Path, kind: str) -> None:
-    _, way, force = ran(tmp_path, beside(0.05, "*STATIC, DIRECT\n.04, 1.", kind=kind))
+def test_kinds_of_elements(tmp_path: Path, kind: str, options: str) -> None:
+    _, way, force = ran(tmp_path, beside(0.05, "*STATIC, DIRECT\n.04, 1.", options, kind))
     assert np.abs(force[way < -0.001*WAY]).max() == 0.0
     assert force[-1, 0] > 0.5*abs(force[-1, 2])
 
