@@ -119,6 +119,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
 
+      self%memo%is_known = .false.
       self%faces%is_dual = options%multiplier == multiplier_dual
    end subroutine mortar_configure
 
@@ -185,6 +186,7 @@ contains
       call position_memo_take(self%memo, self%faces%near%node, x, u0)
       self%knows_start = .false.
       self%chosen = [self%reach, self%faces%beside, self%faces%close]
+      self%faces%gives_way = self%step%has_compliance
       call mortar_faces_choose(self%faces, x, u0, self%reach, self%step%is_watched)
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
    end subroutine choose_stencils

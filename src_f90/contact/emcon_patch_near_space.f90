@@ -110,7 +110,8 @@ contains
             associate (f => sides%triangles%split%facet(near%triangle(t)), &
                   way => c(:, 1)*nearest%weight(1) + c(:, 2)*nearest%weight(2) &
                   + c(:, 3)*nearest%weight(3))
-               if (touch_rule_space_is_through(sides%rule, i, f, n, -way)) n = 0.0_wp
+               if (touch_rule_space_is_through(sides%rule, i, f, n, -way, near%gives_way)) &
+                  n = 0.0_wp
                if (touch_rule_space_is_beyond(sides%rule, i, f, own, way)) n = 0.0_wp
             end associate
             nearest = nearest_t()

@@ -106,3 +106,25 @@ def test_soft_contact_keeps_what_it_stores_past_an_end(tmp_path: Path) -> None:
     deck.write_text(text)
     total = run_deck(deck, tmp_path).history["total"]
     assert np.abs(total - total[0]).max() <= 1e-12*total[0]
+
+
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
+@pytest.mark.parametrize("thickness", [0.05, 0.02, 0.01])
+def test_far_sides_of_thin_sheets_do_not_meet(tmp_path: Path, thickness: float, options: str) -> None:
+    """A sheet much thinner than its facets are long is pressed on another: what is behind them is not touched."""
+    low = Block("C3D8", (4, 4, 1), size=(1.0, 1.0, thickness), place=lambda x: x)
+    high = Block("C3D8", (3, 3, 1), size=(1.0, 1.0, thickness), place=lambda x: x + np.array([0.0, 0.0, 1.2*thickness]))
+    foot = "".join(f"{k}\n" for k in low.on(2, 0) + len(high.x))
+    deck = tmp_path/"deck.inp"
+    deck.write_text(bodies([high, low], [faces(high), faces(low)], f"*ELASTIC\n{E}, 0.\n*DENSITY\n1.\n")
+                    + f"*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I{options}\nS1, S2\n*NSET, NSET=FOOT\n{foot}"
+                    + "*BOUNDARY\nFOOT, 1, 3\nN1, 1, 2\n*STEP, NLGEOM\n*STATIC, DIRECT\n.25, 1.\n*DLOAD\nB1, P2, 1.\n"
+                    + "*NODE FILE\nU\n*CONTACT FILE\nCF\n*END STEP\n")
+    run = run_deck(deck, tmp_path)
+    force = sum(run.history[name][-1] for name in run.history.dtype.names if name.endswith("force_z"))
+    assert abs(force) == pytest.approx(1.0, rel=1e-9)
+    # A pressure of .01 E in both sheets, after the gap.
+    u = run.fields()["displacement"][-1][:len(high.x), 2]
+    assert u.min() == pytest.approx(-0.22*thickness, rel=2e-3)
+    assert run.history["cuts"].sum() == 0
+    assert run.verdict["verdict"] == "good"
