@@ -18,6 +18,7 @@ module emcon_edge_choice_space
       outline_edges_normals, outline_edges_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
+   use emcon_touch_rule_space, only : through
    implicit none
    private
    public :: edge_choice_t, edge_choice_follow_arcs, edge_choice_init, edge_choice_is_guard, &
@@ -212,6 +213,7 @@ contains
       if (gap - self%offset < -deepest*minval(length) .or. gap > self%reach) return
       if (-gap > way_out(self%edges, new, crossing, length) + room_beside*minval(length) .and. &
          .not. self%gives_way) return
+      if (is_through(self, new, gap)) return
       least = least_turn
       if (gap - self%offset < -inside*minval(length) .or. (within > clear .and. &
          self%edges%bends(m))) least = -hollow
@@ -224,6 +226,18 @@ contains
       new%beyond = beyond_ends(crossing)
       call put(self, i, new)
    end subroutine choose
+
+   !> Is one edge on the far side of the other body, by the elements of both?
+   pure logical function is_through(self, crossing, gap)
+      type(edge_choice_t), intent(in) :: self
+      type(edge_stencil_t), intent(in) :: crossing
+      real(wp), intent(in) :: gap                !! [L]
+
+      associate (both => [crossing%edge, crossing%master])
+         is_through = .not. self%gives_way .and. -gap > through*sum(self%edges%depth(both)) &
+            .and. self%body(both(1)) /= self%body(both(2))
+      end associate
+   end function is_through
 
    !> Give a crossing of slave `i` a place: that of the class of its edge, or a later one. Where it
    !> is taken, the crossing that comes first has it, and the other one goes on to the next: who has

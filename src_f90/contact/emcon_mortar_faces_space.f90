@@ -17,7 +17,7 @@ module emcon_mortar_faces_space
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_touch_rule_space, only : touch_rule_space_init
+   use emcon_touch_rule_space, only : touch_rule_space_depths, touch_rule_space_init
    implicit none
    private
    public :: mortar_faces_t, mortar_faces_init, mortar_faces_look, mortar_faces_choose
@@ -38,6 +38,7 @@ module emcon_mortar_faces_space
       real(wp) :: close = 0.0_wp                      !! so far off a facet may close, as above [L]
       logical, allocatable :: may_close(:)            !! (n) in the step, or are watched: only
                                                       !! these are measured
+      logical :: gives_way = .false.                  !! bodies may be deep in each other
       integer :: n_sifted = 0                         !! the list that `sift` has gone through
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_triangle)
    end type mortar_faces_t
@@ -66,6 +67,9 @@ contains
             sides%rule%facet_of_point = mortar_itself_facet(self%itself, self%split%facet)
             sides%rule%body_of_point = sides%rule%body(sides%rule%facet_of_point)
          end if
+         sides%rule%depth = touch_rule_space_depths(sides%master, scene)
+         sides%rule%own_depth = touch_rule_space_depths(sides%slave, scene)
+         sides%rule%own_depth = sides%rule%own_depth(self%split%facet)
          call facet_frames_init(sides%frames, sides%slave, self%split)
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
          allocate(sides%mirror(sides%master%n_facet), source=0)
@@ -179,6 +183,7 @@ contains
          end associate
       end associate
       scope%beside = self%beside
+      scope%gives_way = self%gives_way
       do t = self%split%start(f), self%split%start(f + 1) - 1
          scope%facet = with_neighbours(self, f, ahead_of(self, t, seen, x, u0))
          scope%is_far = [(find_sorted(seen, scope%facet(k)) == 0, k = 1, size(scope%facet))]

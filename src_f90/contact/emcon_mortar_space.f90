@@ -26,6 +26,7 @@ module emcon_mortar_space
       mortar_sight, sight_t
    use emcon_patch_gap_space, only : patch_sums_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
+   use emcon_patch_near_space, only : room_beside
    use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_gather
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
@@ -35,6 +36,8 @@ module emcon_mortar_space
 
    !> A node is let go where less than this part of its surface is covered.
    real(wp), parameter :: least_cover = 0.02_wp
+   !> Hard contact holds it where as much of that is over the master itself, not past its end.
+   real(wp), parameter :: least_own = 1.0e-3_wp
    !> So far, per facet, a mean gap may be closed where contact begins.
    real(wp), parameter :: max_penetration_mean = 0.2_wp
 
@@ -116,6 +119,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
 
+      self%memo%is_known = .false.
       self%faces%is_dual = options%multiplier == multiplier_dual
    end subroutine mortar_configure
 
@@ -182,6 +186,7 @@ contains
       call position_memo_take(self%memo, self%faces%near%node, x, u0)
       self%knows_start = .false.
       self%chosen = [self%reach, self%faces%beside, self%faces%close]
+      self%faces%gives_way = self%step%has_compliance
       call mortar_faces_choose(self%faces, x, u0, self%reach, self%step%is_watched)
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
    end subroutine choose_stencils
@@ -367,9 +372,43 @@ contains
             - self%sagitta(i)
          if (state%is_arriving) state%was_open = &
             ahead - self%offset >= -max_penetration_on_entry*state%size
+         if (.not. self%step%has_compliance) call leave_beside(self, i, &
+            -merge(state%gap0, ahead - self%offset, area(0) > 0.0_wp), state)
          if (state%gap0 < -deepest - self%offset) state = gap_state_t(size=state%size)
       end associate
    end subroutine measure_vertex
+
+   !> What part of constraint `i` is over the master itself, not past its end, at the start and at
+   !> the end. By the shares of its vertex as they are on facets that are not covered: none is
+   !> negative.
+   pure function over_master(self, i) result(part)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp) :: part(0:1)
+      integer :: k
+
+      part = 0.0_wp
+      do k = self%faces%start(i), self%faces%start(i + 1) - 1
+         part = part + matmul(mortar_slave_weight(self%faces, k, 0.0_wp), &
+            self%basis(self%faces%triangle(k))%own)
+      end do
+      part = part/self%whole(i)
+   end function over_master
+
+   !> Hard contact: what does not come over the master itself is not over it, and what begins deep
+   !> behind it, and farther than it reaches in beyond its end, is beside it: the way out is there.
+   pure subroutine leave_beside(self, i, depth, state)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in) :: depth              !! behind the master at the start [L]
+      type(gap_state_t), intent(inout) :: state
+      real(wp) :: part(0:1)
+
+      part = over_master(self, i)
+      state%is_over = state%is_over .and. maxval(part) >= least_own
+      if (depth > room_beside*min(state%size, state%other_size) .and. depth &
+         > part(0)*state%size) state = gap_state_t(size=state%size)
+   end subroutine leave_beside
 
    pure subroutine mortar_evaluate(self, wanted, x, u0, du, target, item)
       class(mortar_space_t), intent(inout) :: self

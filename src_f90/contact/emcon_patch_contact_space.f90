@@ -35,7 +35,7 @@ module emcon_patch_contact_space
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
    use emcon_touch_rule_space, only : touch_rule_space_init, touch_rule_space_may, &
-      touch_rule_space_sees
+      touch_rule_space_measure, touch_rule_space_sees
    implicit none
    private
    public :: patch_contact_t, patch_contact_init
@@ -107,6 +107,8 @@ contains
          sides%mirror = mirror_axes(sides%master, scene)
          sides%rests = rests_of_points(sides, sides%node_rests)
          if (pair%slave == pair%master) call touch_rule_space_init(sides%rule, sides%slave, &
+            sides%frames%middle, scene)
+         call touch_rule_space_measure(sides%rule, sides%slave, sides%master, &
             sides%frames%middle, scene)
          associate (n => sides%frames%n, m => sides%rule%n_class)
             self%frame = [(1 + (i - 1)/m, i = 1, n*m)]

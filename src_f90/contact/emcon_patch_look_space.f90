@@ -32,6 +32,7 @@ module emcon_patch_look_space
    type :: patch_t
       integer :: n_vertex = 0
       integer :: n_triangle = 0
+      integer :: n_own = 0                       !! the first ones are of the surface itself
       integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise
       real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
       real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
@@ -55,7 +56,8 @@ module emcon_patch_look_space
    !> The same of a patch of a slave facet, weight by weight.
    type :: patch_basis_t
       real(wp) :: height(3, 0:1) = 0.0_wp        !! integral of chi times height [L^3]
-      real(wp) :: cover(3, 0:1) = 0.0_wp         !! that of chi [L^2]
+      real(wp) :: cover(3, 0:1) = 0.0_wp         !! that of chi [L^2],
+      real(wp) :: own(3, 0:1) = 0.0_wp           !! of it by the surface itself, not past its end
       real(wp) :: area(0:1) = 0.0_wp             !! of all of it [L^2]
       real(wp) :: way = 0.0_wp                   !! as above
       real(wp) :: ahead = 0.0_wp                 !! as above
@@ -237,40 +239,46 @@ contains
       call place_vertices(patch, x + dx, place(:, :, 1))
       call patch_sees(patch, start, place(:, :, 1), is_seen)
       if (.not. knows_start) call find_basis(patch, start%number > 0, frame_size(x(:, :3)), &
-         place(:, :, 0), basis%height(:, 0), basis%cover(:, 0), basis%area(0))
-      call find_basis(patch, is_seen, frame_size(x(:, :3) + dx(:, :3)), place(:, :, 1), &
-         basis%height(:, 1), basis%cover(:, 1), basis%area(1))
+         place(:, :, 0), 0, basis)
+      call find_basis(patch, is_seen, frame_size(x(:, :3) + dx(:, :3)), place(:, :, 1), 1, basis)
       basis%way = longest_way(patch, x, place)
       basis%ahead = height_ahead(patch, is_seen, place(:, :, 0))
    end subroutine basis_from
 
-   !> The same at one configuration.
-   pure subroutine find_basis(patch, is_seen, size_of, place, height, cover, area)
+   !> The same at one end of the step.
+   pure subroutine find_basis(patch, is_seen, size_of, place, end, basis)
       type(patch_t), intent(in) :: patch
       logical, intent(in) :: is_seen(:)          !! (n_triangle)
       real(wp), intent(in) :: size_of            !! of the frame [L^2]
       real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
-      real(wp), intent(out) :: height(3), cover(3), area
+      integer, intent(in) :: end                 !! 0: where it begins, 1
+      type(patch_basis_t), intent(inout) :: basis
       real(wp) :: products(3, 3), share(3), corner(2, 3)
       integer :: k, v
 
-      area = 0.5_wp*size_of
-      height = 0.0_wp
-      cover = 0.0_wp
-      do k = 1, patch%n_triangle
-         if (.not. is_seen(k)) cycle
-         associate (t => patch%triangle(:, k))
-            corner = place(:2, t)
-            products = patch_products(patch%area, corner)
-            if (.not. sum(products) > 0.0_wp) cycle
-            products = size_of*products
-            do v = 1, 3
-               share = barycentric(corner, unit_corner(:, v))*patch%chi(t)
-               height = height + products(:, v)*dot_product(share, place(3, t))
-               cover = cover + products(:, v)*sum(share)
-            end do
-         end associate
-      end do
+      associate (height => basis%height(:, end), cover => basis%cover(:, end), &
+            own => basis%own(:, end))
+         basis%area(end) = 0.5_wp*size_of
+         height = 0.0_wp
+         cover = 0.0_wp
+         own = 0.0_wp
+         do k = 1, patch%n_triangle
+            if (k == patch%n_own + 1) own = cover
+            if (.not. is_seen(k)) cycle
+            associate (t => patch%triangle(:, k))
+               corner = place(:2, t)
+               products = patch_products(patch%area, corner)
+               if (.not. sum(products) > 0.0_wp) cycle
+               products = size_of*products
+               do v = 1, 3
+                  share = barycentric(corner, unit_corner(:, v))*patch%chi(t)
+                  height = height + products(:, v)*dot_product(share, place(3, t))
+                  cover = cover + products(:, v)*sum(share)
+               end do
+            end associate
+         end do
+         if (patch%n_own == patch%n_triangle) own = cover
+      end associate
    end subroutine find_basis
 
    !> How far vertices go along a patch, at most [L].

@@ -23,7 +23,7 @@ module emcon_patch_near_space
    real(wp), parameter, public :: room_behind = 0.2_wp
    !> The same where another frame of the node faces that one, or the node is past the end of the
    !> surface: there it is beside the body, not inside of it.
-   real(wp), parameter :: room_beside = 0.02_wp
+   real(wp), parameter, public :: room_beside = 0.02_wp
    !> Beside triangles of slave facets a surface that ends fades over this part of a facet.
    real(wp), parameter, public :: narrow_flange = 0.05_wp
 
@@ -110,7 +110,8 @@ contains
             associate (f => sides%triangles%split%facet(near%triangle(t)), &
                   way => c(:, 1)*nearest%weight(1) + c(:, 2)*nearest%weight(2) &
                   + c(:, 3)*nearest%weight(3))
-               if (touch_rule_space_is_through(sides%rule, i, f, n, -way)) n = 0.0_wp
+               if (touch_rule_space_is_through(sides%rule, i, f, n, -way, near%gives_way)) &
+                  n = 0.0_wp
                if (touch_rule_space_is_beyond(sides%rule, i, f, own, way)) n = 0.0_wp
             end associate
             nearest = nearest_t()

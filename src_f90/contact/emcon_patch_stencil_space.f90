@@ -154,6 +154,7 @@ contains
             if (is_seen(t)) call add_triangle(self, sides, near%triangle(t), code, x)
          end do
       end do
+      self%patch%n_own = self%patch%n_triangle
       do k = 1, 3
          self%corner(k) = vertex_of(self, sides%triangles%split%corner(k, self%triangle))
       end do

@@ -26,6 +26,7 @@ module emcon_facets
       integer, allocatable :: part(:)            !! (n_facet) connected part, by its lowest facet
       real(wp), allocatable :: size(:)           !! (n_facet) length or area in the reference
       integer, allocatable :: element(:)         !! (n_facet) behind it; 0: none
+      real(wp), allocatable :: depth(:)          !! (n_facet) of that, for who has measured it [L]
       integer, allocatable :: face(:)            !! (n_facet) of that element
       integer, allocatable :: node(:)            !! (n_node) ascending
       !> (n_node + 1) facets of node i: around(around_start(i):around_start(i + 1) - 1), ascending

@@ -19,6 +19,7 @@ module emcon_outline_edges_space
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted
    use emcon_surface_nodes, only : surface_nodes
+   use emcon_touch_rule_space, only : touch_rule_space_depths
    implicit none
    private
    public :: outline_edges_t, outline_edges_add, outline_edges_place, outline_edges_normals, &
@@ -42,6 +43,7 @@ module emcon_outline_edges_space
       logical, allocatable :: at_rim(:, :)       !! (2, n) a sharp edge runs across that end
       logical, allocatable :: bends(:)           !! (n) the angle between its triangles may change
       real(wp), allocatable :: breadth(:)        !! (n) of the smaller face there, reference [L]
+      real(wp), allocatable :: depth(:)          !! (n) of the thinner element behind these [L]
       integer, allocatable :: surface(:)         !! (n) 1, 2
    end type outline_edges_t
 
@@ -64,14 +66,17 @@ contains
       call facets_init(own, scene, surface, error)
       if (.not. allocated(error)) call find_outer(scene, own, outer, error)
       ! A mesh that touches itself in an edge has no outline there but its surface.
-      if (allocated(error) .or. .not. allocated(outer)) outer = own
+      if (allocated(error) .or. .not. allocated(outer)) then
+         outer = own
+         outer%depth = touch_rule_space_depths(own, scene)
+      end if
       call facet_split_init(split, outer)
       call find_tied(scene, outer, goes_on)
       goes_on = goes_on .or. mirror_axes(outer, scene) > 0
       if (self%n_surface == 0) allocate(self%node(max_face_nodes, 0), self%weight( &
          max_face_nodes, 0), self%ends(2, 0), self%beside(2, 0), self%is_sharp(0), &
          self%is_spoke(0), self%is_bare(0), &
-         self%breadth(0), self%surface(0))
+         self%breadth(0), self%depth(0), self%surface(0))
       self%n_surface = self%n_surface + 1
       n = size(self%node, 2)
       call add_points(self, outer, split)
@@ -146,11 +151,13 @@ contains
       type(facets_t), allocatable, intent(out) :: outer
       type(error_t), allocatable, intent(out) :: error
       type(surface_t) :: faces
+      real(wp), allocatable :: depth(:)
 
-      call outline_faces_at(scene, own%node, faces%edge)
+      call outline_faces_at(scene, own%node, faces%edge, depth)
       if (size(faces%edge, 2) == 0) return
       allocate(outer)
       call facets_init(outer, scene, faces, error)
+      if (.not. allocated(error)) outer%depth = depth
    end subroutine find_outer
 
    !> Which faces are tied.
@@ -215,7 +222,7 @@ contains
       real(wp), allocatable :: turn(:, :)
       integer :: ends(2, size(outer%corner)), beside(2, size(outer%corner)), f, j, k, m, n
       logical :: is_sharp(size(outer%corner))
-      real(wp) :: breadth(size(outer%corner))
+      real(wp), dimension(size(outer%corner)) :: breadth, depth
 
       call find_turns(outer, scene%x, turn)
       n = 0
@@ -232,10 +239,11 @@ contains
                beside(:, n) = n_before + [apex(f, side), apex(beyond, side)]
                is_sharp(n) = turn(k, f) > ridge_angle + turn_tol
                breadth(n) = min(facets_length(outer, f), facets_length(outer, beyond))
+               depth(n) = minval(outer%depth([f, beyond]))
             end associate
          end do
       end do
-      call append(self, ends(:, :n), beside(:, :n), is_sharp(:n), breadth(:n))
+      call append(self, ends(:, :n), beside(:, :n), is_sharp(:n), breadth(:n), depth(:n))
 
    contains
 
@@ -261,7 +269,7 @@ contains
       logical, intent(in) :: goes_on(:)          !! (n_facet) the body does, behind a face
       integer, intent(in) :: n_before            !! points of other surfaces
       integer :: ends(2, size(outer%corner)), beside(2, size(outer%corner)), f, k, m, n
-      real(wp) :: breadth(size(outer%corner))
+      real(wp), dimension(size(outer%corner)) :: breadth, depth
 
       n = 0
       do f = 1, outer%n_facet
@@ -274,18 +282,20 @@ contains
                beside(:, n + k) = n_before + corner([1 + mod(k + m - 2, m), 1 + mod(k, m)])
             end do
             breadth(n + 1:n + m) = facets_length(outer, f)
+            depth(n + 1:n + m) = outer%depth(f)
             n = n + m
          end associate
       end do
-      call append(self, ends(:, :n), beside(:, :n), spread(.false., 1, n), breadth(:n))
+      call append(self, ends(:, :n), beside(:, :n), spread(.false., 1, n), breadth(:n), &
+         depth(:n))
    end subroutine add_spokes
 
    !> Append edges of the newest surface.
-   pure subroutine append(self, ends, beside, is_sharp, breadth)
+   pure subroutine append(self, ends, beside, is_sharp, breadth, depth)
       type(outline_edges_t), intent(inout) :: self
       integer, intent(in) :: ends(:, :), beside(:, :)
       logical, intent(in) :: is_sharp(:)
-      real(wp), intent(in) :: breadth(:)         !! [L]
+      real(wp), intent(in) :: breadth(:), depth(:)   !! [L]
       integer :: i, n
 
       n = size(self%is_sharp) + size(is_sharp)
@@ -296,6 +306,7 @@ contains
          size(is_sharp))]
       self%is_bare = [self%is_bare, (is_centre(self%node(:, ends(2, i))), i = 1, size(is_sharp))]
       self%breadth = [self%breadth, breadth]
+      self%depth = [self%depth, depth]
       self%surface = [self%surface, spread(self%n_surface, 1, size(is_sharp))]
    end subroutine append
 

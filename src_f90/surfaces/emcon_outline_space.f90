@@ -29,10 +29,13 @@ contains
    end subroutine outline_space_init
 
    !> The outer faces of elements that have one of some nodes at least, by their nodes in turn.
-   pure subroutine outline_faces_at(scene, node, facet)
+   pure subroutine outline_faces_at(scene, node, facet, depth)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: node(:)             !! of the scene
       integer, allocatable, intent(out) :: facet(:, :)       !! (most nodes, n) 0: no more
+      real(wp), allocatable, intent(out), optional :: depth(:)   !! (n) shortest sides of their
+                                                 !! elements [L]
+      integer, allocatable :: at(:)
       real(wp), allocatable :: thickness(:)
       logical :: is_meant(0:size(scene%x, 2))
       integer :: f
@@ -40,8 +43,10 @@ contains
       is_meant = .false.
       is_meant(node) = .true.
       call find_free_faces(scene, facet, thickness)
-      facet = facet(:, pack([(f, f = 1, size(facet, 2))], [(any(is_meant(facet(:, f))), &
-         f = 1, size(facet, 2))]))
+      at = pack([(f, f = 1, size(facet, 2))], [(any(is_meant(facet(:, f))), &
+         f = 1, size(facet, 2))])
+      facet = facet(:, at)
+      if (present(depth)) depth = thickness(at)
    end subroutine outline_faces_at
 
    !> The faces that one element alone has.

@@ -1,4 +1,5 @@
-!> Which facets a contact point may touch where a surface in space is in contact with itself.
+!> Which facets a contact point may touch: where a surface in space is in contact with itself, and
+!> what is on the far side of thin bodies.
 !>
 !> Points are its nodes, then the middles of some facets. The surface may run over many bodies. As a
 !> point may touch several of them at once, it has a constraint for each class of bodies. Of its own
@@ -14,13 +15,15 @@ module emcon_touch_rule_space
    private
    public :: touch_rule_space_t, touch_rule_space_init, touch_rule_space_sees, &
       touch_rule_space_may, touch_rule_space_meet, touch_rule_space_is_through, &
-      touch_rule_space_is_beyond
+      touch_rule_space_is_beyond, touch_rule_space_depths, touch_rule_space_measure
 
    !> Classes of bodies at most, and with them constraints of a frame.
    integer, parameter :: most_classes = 4
    !> Behind a facet by more than this part of the element there, a node of the body is on the other
-   !> side of it: under it, where the way there and the normal have a cosine below this.
-   real(wp), parameter :: through = 0.5_wp, under = -0.5_wp
+   !> side of it: under it, where the way there and the normal have a cosine below this. The same
+   !> holds of another body, by more than this part of the elements of both.
+   real(wp), parameter, public :: through = 0.5_wp
+   real(wp), parameter :: under = -0.5_wp
 
    type :: touch_rule_space_t
       logical :: is_self = .false.               !! else any node may touch any facet
@@ -31,6 +34,7 @@ module emcon_touch_rule_space
       !> Of points in the middle of facets: which facet each is on; not allocated: of none
       integer, allocatable :: facet_of_point(:)
       real(wp), allocatable :: depth(:)          !! (n_facet) of the element behind it [L]
+      real(wp), allocatable :: own_depth(:)      !! (n_point) the same of points, the least [L]
       logical, allocatable :: is_closed(:)       !! (n_facet) its connected part has no rim
    end type touch_rule_space_t
 
@@ -45,7 +49,6 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable :: body(:)
       logical, allocatable :: has_rim(:)
-      real(wp), allocatable :: still(:, :)
       integer :: f, n_body
 
       self%is_self = .true.
@@ -61,10 +64,37 @@ contains
          end if
       end do
       self%is_closed = .not. has_rim(facets%part)
-      allocate(still, mold=scene%x)
-      still = 0.0_wp
-      self%depth = [(depth_behind(facets, f, scene, still), f = 1, facets%n_facet)]
+      self%depth = touch_rule_space_depths(facets, scene)
    end subroutine touch_rule_space_init
+
+   !> Measure how thick elements are behind facets and points that are nodes, then middles.
+   pure subroutine touch_rule_space_measure(self, slave, master, middle, scene)
+      type(touch_rule_space_t), intent(inout) :: self
+      type(facets_t), intent(in) :: slave, master    !! in space; of points and of facets
+      integer, intent(in) :: middle(:)           !! facets of the slave whose middles are points
+      type(scene_t), intent(in) :: scene
+      real(wp) :: own(slave%n_facet)
+      integer :: i
+
+      self%depth = touch_rule_space_depths(master, scene)
+      own = touch_rule_space_depths(slave, scene)
+      associate (start => slave%around_start)
+         self%own_depth = [(minval(own(slave%around(start(i):start(i + 1) - 1))), &
+            i = 1, size(slave%node)), own(middle)]
+      end associate
+   end subroutine touch_rule_space_measure
+
+   !> How far the elements behind facets reach behind them in the reference [L].
+   pure function touch_rule_space_depths(facets, scene) result(depth)
+      type(facets_t), intent(in) :: facets       !! in space
+      type(scene_t), intent(in) :: scene
+      real(wp) :: depth(facets%n_facet)
+      real(wp) :: still(size(scene%x, 1), size(scene%x, 2))
+      integer :: f
+
+      still = 0.0_wp
+      depth = [(depth_behind(facets, f, scene, still), f = 1, facets%n_facet)]
+   end function touch_rule_space_depths
 
    !> How far the element behind facet `f` reaches behind it in the reference; where there is none,
    !> as far as the facet is long [L].
@@ -156,21 +186,36 @@ contains
       end do
    end function shares_a_node
 
-   !> Is point `i` on the other side of its own body, seen from facet `f`?
-   pure logical function touch_rule_space_is_through(self, i, f, normal, way) result(is_through)
+   !> Is point `i` on the other side of its own body, seen from facet `f`, or of another one?
+   pure logical function touch_rule_space_is_through(self, i, f, normal, way, gives_way) &
+      result(is_through)
       type(touch_rule_space_t), intent(in) :: self
       integer, intent(in) :: i                   !! as in `touch_rule_space_may`
       integer, intent(in) :: f                   !! 1 to n_facet
       real(wp), intent(in) :: normal(3)          !! of it or a part of it, of length 1, outwards
       real(wp), intent(in) :: way(3)             !! from its nearest place to the node [L]
-      real(wp) :: distance
+      logical, intent(in) :: gives_way           !! other bodies may be deep in this one
+      real(wp) :: distance, depth
 
       is_through = .false.
-      if (.not. self%is_self) return
-      if (self%body_of_point(i) /= self%body(f)) return
+      if (is_own(self, i, f)) then
+         depth = self%depth(f)
+      else
+         if (gives_way .or. .not. allocated(self%own_depth)) return
+         depth = self%depth(f) + self%own_depth(i)
+      end if
       distance = sqrt(dot_product(way, way))
-      is_through = distance > through*self%depth(f) .and. dot_product(way, normal) < under*distance
+      is_through = distance > through*depth .and. dot_product(way, normal) < under*distance
    end function touch_rule_space_is_through
+
+   !> Is facet `f` of the body that point `i` is of?
+   pure logical function is_own(self, i, f)
+      type(touch_rule_space_t), intent(in) :: self
+      integer, intent(in) :: i, f
+
+      is_own = self%is_self
+      if (is_own) is_own = self%body_of_point(i) == self%body(f)
+   end function is_own
 
    !> Is facet `f` on the other side of its own body, seen from point `i` in the middle of a facet?
    pure logical function touch_rule_space_is_beyond(self, i, f, normal, way) result(is_beyond)

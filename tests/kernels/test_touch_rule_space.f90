@@ -7,7 +7,7 @@ module test_touch_rule_space
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_touch_rule_space, only : touch_rule_space_init, touch_rule_space_is_through, &
-      touch_rule_space_may, touch_rule_space_sees, touch_rule_space_t
+      touch_rule_space_may, touch_rule_space_measure, touch_rule_space_sees, touch_rule_space_t
    use space_scenes, only : add_box, skin, space_begin
    implicit none
    private
@@ -23,7 +23,8 @@ contains
       tests = [ &
          test_case_t("facets beside a node, and on another body", test_may), &
          test_case_t("classes of bodies", test_classes), &
-         test_case_t("the other side of the body", test_through)]
+         test_case_t("the other side of the body", test_through), &
+         test_case_t("the far side of another body", test_far_side)]
    end subroutine collect_touch_rule_space
 
    !> Boxes of 6 x 6 x 1 cells of size 1 beside each other, `n` of them.
@@ -109,10 +110,35 @@ contains
 
       call begin(1, scene, facets, rule, error)
       if (allocated(error)) return
-      call check_true(error, touch_rule_space_is_through(rule, 1, 1, down, -down), "through")
-      call check_true(error, .not. touch_rule_space_is_through(rule, 1, 1, down, -0.25_wp*down), &
-         "a little behind")
-      call check_true(error, .not. touch_rule_space_is_through(rule, 1, 1, down, down), "in front")
+      call check_true(error, touch_rule_space_is_through(rule, 1, 1, down, -down, .false.), &
+         "through")
+      call check_true(error, .not. touch_rule_space_is_through(rule, 1, 1, down, -0.25_wp*down, &
+         .false.), "a little behind")
+      call check_true(error, .not. touch_rule_space_is_through(rule, 1, 1, down, down, .false.), &
+         "in front")
    end subroutine test_through
+
+   !> Of two bodies an element thick each the far side is behind by more than half of both.
+   subroutine test_far_side(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(facets_t) :: facets
+      type(touch_rule_space_t) :: rule
+      real(wp), parameter :: down(3) = [0.0_wp, 0.0_wp, -1.0_wp]
+
+      call begin(2, scene, facets, rule, error)
+      if (allocated(error)) return
+      associate (node => size(facets%node))
+         call check_true(error, .not. touch_rule_space_is_through(rule, node, 1, down, &
+            -1.1_wp*down, .false.), "points are not measured")
+         call touch_rule_space_measure(rule, facets, facets, none, scene)
+         call check_true(error, touch_rule_space_is_through(rule, node, 1, down, -1.1_wp*down, &
+            .false.), "through both")
+         call check_true(error, .not. touch_rule_space_is_through(rule, node, 1, down, &
+            -0.9_wp*down, .false.), "one in the other")
+         call check_true(error, .not. touch_rule_space_is_through(rule, node, 1, down, &
+            -1.1_wp*down, .true.), "what gives way")
+      end associate
+   end subroutine test_far_side
 
 end module test_touch_rule_space

@@ -41,7 +41,7 @@ def ran(folder: Path, text: str) -> tuple[Run, np.ndarray, np.ndarray]:
 
 # Depths from a few hundredths of the punch's elements to most of one.
 @pytest.mark.parametrize("depth", [0.012, 0.03, 0.05, 0.08, 0.2])
-@pytest.mark.parametrize("options", ["", ", SIDES=ONE", ", EDGES=NO"])
+@pytest.mark.parametrize("options", ["", ", SIDES=ONE", ", EDGES=NO", ", TYPE=MORTAR"])
 def test_the_side_is_pushed_and_only_when_it_is_met(tmp_path: Path, depth: float, options: str) -> None:
     _, way, force = ran(tmp_path, beside(depth, "*STATIC, DIRECT\n.04, 1.", options))
     assert np.abs(force[way < -0.001*WAY]).max() == 0.0
@@ -55,34 +55,39 @@ def test_the_side_is_pushed_and_only_when_it_is_met(tmp_path: Path, depth: float
     assert pushes[0] == pytest.approx(pushes[2]*way[first]/way[first + 2], rel=0.15)
 
 
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
 @pytest.mark.parametrize("more", ["", "*FRICTION\n.3\n"])
-def test_nothing_acts_across_the_gap_in_dynamics(tmp_path: Path, more: str) -> None:
-    run, way, force = ran(tmp_path, beside(0.05, "*DYNAMIC, DIRECT\n.02, 1.", more=more))
+def test_nothing_acts_across_the_gap_in_dynamics(tmp_path: Path, more: str, options: str) -> None:
+    run, way, force = ran(tmp_path, beside(0.05, "*DYNAMIC, DIRECT\n.02, 1.", options, more=more))
     # PERSISTENT contact acts across the last open gap at most, the way of one increment.
     assert np.abs(force[way < -0.02*WAY - 0.01*GAP]).max() == 0.0
     assert force[way > 0.0, 0].max() > 0.0
     assert run.verdict["verdict"] == "good"
 
 
-@pytest.mark.parametrize("clearance", [0.0, 0.001, 0.005, 0.02, 0.06])
+@pytest.mark.parametrize("clearance", [0.0, 0.001, 0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
 @pytest.mark.parametrize("cells", [1, 2, 4])
-def test_a_cube_falls_past_a_table(tmp_path: Path, clearance: float, cells: int) -> None:
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
+@pytest.mark.parametrize("kind", ["C3D8", "C3D4"])
+def test_a_cube_falls_past_a_table(tmp_path: Path, kind: str, options: str, cells: int, clearance: float) -> None:
     """Beside it, nearer than any facet is long, or along its side: a free fall."""
-    table = Block("C3D8", (4, 4, 4), size=(2.0, 2.0, 2.0), place=lambda x: x - np.array([0.0, 0.0, 2.0]))
-    cube = Block("C3D8", (cells,)*3, size=(0.5, 0.5, 0.5), place=lambda x: x + np.array([2.0 + clearance, 0.7, 0.1]))
+    table = Block(kind, (2, 4, 4), size=(1.0, 2.0, 2.0), place=lambda x: x + np.array([1.0, 0.0, -2.0]))
+    cube = Block(kind, (cells,)*3, size=(0.5, 0.5, 0.5), place=lambda x: x + np.array([2.0 + clearance, 0.7, 0.1]))
     foot = "".join(f"{len(cube.x) + k}, 1, 3\n" for k in table.on(2, 0))
     deck = tmp_path/"deck.inp"
-    deck.write_text(bodies([cube, table], [faces(cube), faces(table)], "*ELASTIC\n1000., .3\n*DENSITY\n1.\n") + pair()
-                    + f"*BOUNDARY\n{foot}" + dynamic(0.01, 0.4, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"))
+    deck.write_text(bodies([cube, table], [faces(cube), faces(table)], "*ELASTIC\n1000., .3\n*DENSITY\n1.\n")
+                    + f"*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I{options}\nS1, S2\n*BOUNDARY\n{foot}"
+                    + dynamic(0.01, 0.3, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"))
     run = run_deck(deck, tmp_path)
     u = run.fields()["displacement"][-1][:len(cube.x)]
-    assert np.abs(u - [0.0, 0.0, -0.5*10.0*0.4**2]).max() <= 1e-11
+    assert np.abs(u - [0.0, 0.0, -0.5*10.0*0.3**2]).max() <= 1e-11
     assert max(np.abs(run.history[f"pair1_force_{a}"]).max() for a in "xyz") <= 1e-11
 
 
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
 @pytest.mark.parametrize("kind", ["C3D4", "C3D10", "C3D20"])
-def test_kinds_of_elements(tmp_path: Path, kind: str) -> None:
-    _, way, force = ran(tmp_path, beside(0.05, "*STATIC, DIRECT\n.04, 1.", kind=kind))
+def test_kinds_of_elements(tmp_path: Path, kind: str, options: str) -> None:
+    _, way, force = ran(tmp_path, beside(0.05, "*STATIC, DIRECT\n.04, 1.", options, kind))
     assert np.abs(force[way < -0.001*WAY]).max() == 0.0
     assert force[-1, 0] > 0.5*abs(force[-1, 2])
 
@@ -101,3 +106,25 @@ def test_soft_contact_keeps_what_it_stores_past_an_end(tmp_path: Path) -> None:
     deck.write_text(text)
     total = run_deck(deck, tmp_path).history["total"]
     assert np.abs(total - total[0]).max() <= 1e-12*total[0]
+
+
+@pytest.mark.parametrize("options", ["", ", TYPE=MORTAR"])
+@pytest.mark.parametrize("thickness", [0.05, 0.02, 0.01])
+def test_far_sides_of_thin_sheets_do_not_meet(tmp_path: Path, thickness: float, options: str) -> None:
+    """A sheet much thinner than its facets are long is pressed on another: what is behind them is not touched."""
+    low = Block("C3D8", (4, 4, 1), size=(1.0, 1.0, thickness), place=lambda x: x)
+    high = Block("C3D8", (3, 3, 1), size=(1.0, 1.0, thickness), place=lambda x: x + np.array([0.0, 0.0, 1.2*thickness]))
+    foot = "".join(f"{k}\n" for k in low.on(2, 0) + len(high.x))
+    deck = tmp_path/"deck.inp"
+    deck.write_text(bodies([high, low], [faces(high), faces(low)], f"*ELASTIC\n{E}, 0.\n*DENSITY\n1.\n")
+                    + f"*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I{options}\nS1, S2\n*NSET, NSET=FOOT\n{foot}"
+                    + "*BOUNDARY\nFOOT, 1, 3\nN1, 1, 2\n*STEP, NLGEOM\n*STATIC, DIRECT\n.25, 1.\n*DLOAD\nB1, P2, 1.\n"
+                    + "*NODE FILE\nU\n*CONTACT FILE\nCF\n*END STEP\n")
+    run = run_deck(deck, tmp_path)
+    force = sum(run.history[name][-1] for name in run.history.dtype.names if name.endswith("force_z"))
+    assert abs(force) == pytest.approx(1.0, rel=1e-9)
+    # A pressure of .01 E in both sheets, after the gap.
+    u = run.fields()["displacement"][-1][:len(high.x), 2]
+    assert u.min() == pytest.approx(-0.22*thickness, rel=2e-3)
+    assert run.history["cuts"].sum() == 0
+    assert run.verdict["verdict"] == "good"
