@@ -123,6 +123,7 @@ contains
                   h(origin, origin) = h(origin, origin) + 2.0_wp*half
                end associate
             end do
+            if (.not. any(abs(by_place(i, :, k)) > 0.0_wp)) cycle
             part = sum_of(unit(i), place%mean_way, place%mean_vector)
             turn = sum_of(by_place(i, :, k), place%end_way, place%end_vector)
             do j = 1, n_wall_point
@@ -151,11 +152,14 @@ contains
    pure function wall_slip_axis(wall, x) result(along)
       type(wall_t), intent(in) :: wall
       real(wp), intent(in) :: x(n_dim, n_wall_point)   !! point, origin, tips [L]
-      real(wp) :: along(n_dim)
+      real(wp) :: along(n_dim), place(n_dim)
       type(wall_spot_t) :: start
+      integer :: i
 
-      start = wall_find(wall, own_vectors(wall), matmul(x(:, 1) - x(:, 2), x(:, 3:) &
-         - spread(x(:, 2), 2, n_dim))/wall%arm)
+      do i = 1, n_dim
+         place(i) = dot_product(x(:, 1) - x(:, 2), x(:, 2 + i) - x(:, 2))/wall%arm
+      end do
+      start = wall_find(wall, own_vectors(wall), place)
       along = 0.0_wp
       along(minloc(abs(start%normal), 1)) = 1.0_wp
    end function wall_slip_axis
@@ -188,6 +192,8 @@ contains
       axis = tangent_axis(middle%normal, along)
       basis = tangent_basis(middle%normal, axis)
       bend = 0.5_wp*wall_bend(wall, own_vectors(wall), half_way)
+      by_place = 0.0_wp
+      if (.not. any(abs(bend) > 0.0_wp)) return  ! its normal does not turn
       lean = dot_product(middle%normal, axis)/norm2(matmul(axis, basis))
       associate (turn => matmul(transpose(basis), bend))
          do i = 1, n_dim
