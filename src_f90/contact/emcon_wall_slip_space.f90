@@ -123,6 +123,7 @@ contains
                   h(origin, origin) = h(origin, origin) + 2.0_wp*half
                end associate
             end do
+            if (.not. any(abs(by_place(i, :, k)) > 0.0_wp)) cycle
             part = sum_of(wall_axis(i), place%mean_way, place%mean_vector)
             turn = sum_of(by_place(i, :, k), place%end_way, place%end_vector)
             do j = 1, n_wall_point
@@ -175,6 +176,8 @@ contains
       axis = tangent_axis(middle%normal, along)
       basis = tangent_basis(middle%normal, axis)
       bend = 0.5_wp*wall_bend(wall, own_vectors(wall), half_way)
+      by_place = 0.0_wp
+      if (.not. any(abs(bend) > 0.0_wp)) return  ! its normal does not turn
       lean = dot_product(middle%normal, axis)/norm2(matmul(axis, basis))
       associate (turn => matmul(transpose(basis), bend))
          do i = 1, n_dim

@@ -52,10 +52,11 @@ def deck(cells: tuple[int, int, int], on_plate: bool, mu: float) -> str:
 
 
 def measure(path: pathlib.Path) -> tuple[float, dict]:
-    """Seconds of the user, and what the run says of itself."""
+    """Seconds of the processor, and what the run says of itself. Of runs of some ms Linux tells by samples alone which of
+    them are the user's."""
     done = usage([PROGRAM, path, "--quiet", "--threads", 1, "--output", path.parent])
     assert done.code == 0, done.errors
-    return done.user, Run(path.with_suffix("")).verdict
+    return done.cpu, Run(path.with_suffix("")).verdict
 
 
 def main() -> None:
