@@ -93,11 +93,13 @@ contains
       call phase_leave(system%phases, left)
    end subroutine candidates_select
 
-   !> Contacts in which nothing is free to move are no candidates: no force closes them.
-   subroutine exclude_bound(self, system, motion)
+   !> Contacts in which nothing is free to move are no candidates: no force closes them. As
+   !> sets are solved rows of nothing show as such: only others are looked at.
+   subroutine exclude_bound(self, system, motion, is_known)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
+      logical, intent(in), optional :: is_known(:)   !! (n_constraint) as sets are: they are none
       logical :: may_be(self%set%n)
       integer :: k, pair, i
 
@@ -105,12 +107,16 @@ contains
       do k = self%set%n_permanent + 1, self%set%n
          call constraint_index(system, self%set%id(k), pair, i)
          may_be(k) = numbering_holds(system%space%numbering, system%contact(pair)%contact%node(i))
+         if (present(is_known)) may_be(k) = may_be(k) .and. .not. is_known(self%set%id(k)) &
+            .and. system%contact(pair)%contact%least_free() > 0.0_wp
       end do
       if (.not. any(may_be)) return
       call constraints_evaluate(self%set, system, motion, .true.)
       call constraints_rows(self%set, system%space%numbering)
       do k = self%set%n_permanent + 1, self%set%n
-         may_be(k) = may_be(k) .and. is_bound(self%set, k)
+         if (.not. may_be(k)) cycle
+         call constraint_index(system, self%set%id(k), pair, i)
+         may_be(k) = is_bound(self%set, k, system%contact(pair)%contact%least_free())
          if (may_be(k)) call exclude(self, self%set%id(k))
       end do
       if (any(may_be)) call active_set_select(self, system, motion, self%candidates%is_measured)
@@ -128,6 +134,7 @@ contains
 
       call phase_enter(system%phases, phase_gaps, left)
       call active_set_select(self, system, motion, self%candidates%is_measured)
+      call exclude_bound(self, system, motion, self%start%was_active .or. self%candidates%acted)
       self%candidates%acts = .false.
       do k = 1, self%set%n
          self%candidates%acts(self%set%id(k)) = .true.
@@ -168,17 +175,23 @@ contains
             self%candidates%takes_part(id) = .false.
             self%is_left_out(id) = .true.
          end if
-         if (is_bound(self%set, redundant(k))) call exclude(self, id)
+         if (is_bound(self%set, redundant(k), 0.0_wp)) call exclude(self, id)
          self%is_active(id) = .false.
       end do
    end subroutine candidates_leave_out
 
-   !> Is nothing in row `k` of the set free to move?
-   pure logical function is_bound(set, k)
-      type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: k
+   !> Is nothing in row `k` of the set free to move, or no more than a part `least` of it?
+   pure logical function is_bound(set, k, least)
+      type(constraint_set_t), intent(in) :: set  !! evaluated, with its rows
+      integer, intent(in) :: k                   !! 1 to n
+      real(wp), intent(in) :: least              !! 0 to 1
 
-      is_bound = set%force_rows%row_start(k) == set%force_rows%row_start(k + 1)
+      associate (own => set%item(k), first => set%force_rows%row_start(k), &
+            last => set%force_rows%row_start(k + 1) - 1)
+         is_bound = last < first
+         if (least > 0.0_wp) is_bound = is_bound .or. norm2(set%force_rows%value(first:last)) &
+            <= least*norm2(own%g(:, :own%n_node))
+      end associate
    end function is_bound
 
    !> Contact `id` cannot act in this step.

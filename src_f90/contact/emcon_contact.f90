@@ -14,7 +14,7 @@ module emcon_contact
    use emcon_motion, only : motion_t
    implicit none
    private
-   public :: contact_t, contact_box_t, contact_step_t, gap_state_t
+   public :: strained_only, contact_t, contact_box_t, contact_step_t, gap_state_t
    public :: max_penetration_on_entry, gap_ratio, push_place
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
@@ -24,6 +24,11 @@ module emcon_contact
    !> So far, per edge, a contact may close in the step in which it slides onto its surface: corners
    !> dip into edges; beyond, a body flies through.
    real(wp), parameter :: max_penetration_on_entry = 0.05_wp
+
+   !> Gaps that are integrated follow what is free to move by this part, at most, where that is but
+   !> the strains of faces at a node that is held. A force that closes such a gap is as much larger
+   !> than what it does.
+   real(wp), parameter :: strained_only = 0.1_wp
 
    !> Where one possible constraint stands at both ends of a step.
    type :: gap_state_t
@@ -100,6 +105,7 @@ module emcon_contact
       procedure :: mean_gap
       procedure :: could_hold
       procedure :: lets_in
+      procedure :: least_free
       procedure :: waits
       procedure :: follow_slips
       ! To be called, with the displacements of nodes:
@@ -197,6 +203,14 @@ contains
       type(contact_options_t), intent(in) :: options   !! as `configure` had them
       logical, intent(in) :: is_wanted           !! else between edges
    end subroutine follow_arcs
+
+   !> At nodes that are held a constraint of which no larger part is free to move does not act, 0 to
+   !> 1.
+   pure real(wp) function least_free(self)
+      class(contact_t), intent(in) :: self
+
+      least_free = 0.0_wp
+   end function least_free
 
    !> How wrong gaps between arcs may be; circles are exact in the plane [L].
    pure real(wp) function curve_doubt(self)

@@ -7,7 +7,7 @@ module emcon_integrated_gap
    use emcon_chain_plane, only : chain_init, chain_t, chain_thickness
    use emcon_condition_nodes, only : condition_include, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, max_penetration_on_entry, strained_only
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_wide, only : wide_t
@@ -49,6 +49,7 @@ module emcon_integrated_gap
       procedure :: area_points => integrated_gap_area
       procedure :: own_area => integrated_gap_own_area
       procedure :: share => integrated_gap_share
+      procedure :: least_free => integrated_gap_least_free
       procedure :: mean_gap => integrated_gap_mean_gap
       procedure :: slip_points => integrated_gap_slip
       procedure(slip_interface), deferred :: choose_slip
@@ -315,6 +316,13 @@ contains
 
       area = self%whole*self%thickness
    end subroutine integrated_gap_own_area
+
+   !> As `contact_t` has it.
+   pure real(wp) function integrated_gap_least_free(self) result(least_free)
+      class(integrated_gap_t), intent(in) :: self
+
+      least_free = strained_only
+   end function integrated_gap_least_free
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.
    pure real(wp) function integrated_gap_share(self, i) result(share)

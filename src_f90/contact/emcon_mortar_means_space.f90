@@ -1,7 +1,7 @@
 !> What mortar contact in space has in common, whatever its master is: gaps of vertices are means
 !> over what is covered of the slave facets around them. Source: docs/theory.md, section 14.2.
 module emcon_mortar_means_space
-   use emcon_contact, only : contact_t
+   use emcon_contact, only : contact_t, strained_only
    use emcon_kinds, only : wp
    implicit none
    private
@@ -15,6 +15,7 @@ module emcon_mortar_means_space
       procedure :: area_points => mortar_area
       procedure :: own_area => mortar_own_area
       procedure :: share => mortar_share
+      procedure :: least_free => mortar_least_free
       procedure :: mean_gap => mortar_mean_gap
    end type mortar_means_t
 
@@ -52,6 +53,13 @@ contains
 
       area = self%whole
    end subroutine mortar_own_area
+
+   !> As `contact_t` has it.
+   pure real(wp) function mortar_least_free(self) result(least_free)
+      class(mortar_means_t), intent(in) :: self
+
+      least_free = strained_only
+   end function mortar_least_free
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.
    pure real(wp) function mortar_share(self, i) result(share)
