@@ -454,6 +454,15 @@ class Model(Source):
                                            "ADJUST": adjust, "INITIATION": initiation},
                           [(slave, master)])
 
+    def clearance(self, slave: str, master: str, value: Number) -> Model:
+        """`*CLEARANCE`: the gap of a contact pair at the start.
+
+        Nodes of the slave surface that face the master are moved there, without stress.
+
+        value           gap of these nodes [L]; below 0 they overlap
+        """
+        return self._card("CLEARANCE", {"SLAVE": slave, "MASTER": master, "VALUE": value})
+
     def contact(self, *surfaces: str | tuple[str, str], interaction: str | None = None,
                 type: str | None = None) -> Model:
         """`*CONTACT`: all free faces of the model with all, or what `surfaces` names.

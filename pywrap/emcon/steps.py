@@ -131,6 +131,15 @@ class Step(Cards):
         """
         return self._card("CONTACT CONTROLS", {"STABILIZE": True} if stabilize else {"RESET": True})
 
+    def model_change(self, *pairs: tuple[str, str], add: bool) -> Step:
+        """`*MODEL CHANGE`: contact pairs act from this step on, or do not, until another change.
+
+        pairs           slave and master surface of each
+        add             True: they act; False: they do not
+        """
+        return self._card("MODEL CHANGE", {"TYPE": "CONTACT PAIR", "ADD": add, "REMOVE": not add},
+                          pairs)
+
     def change_friction(self, interaction: str,
                         friction: Number | Literal["ROUGH"] | None = None) -> Step:
         """`*CHANGE FRICTION`: from the start of this step on, until another change.

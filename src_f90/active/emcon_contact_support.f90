@@ -314,7 +314,7 @@ contains
       end associate
       self%is_pushed = .not. any(is_next)
       if (self%is_pushed) then
-         time = touch_time(scene, bodies%x, direction)
+         time = touch_time(scene, system%i_step, bodies%x, direction)
          if (.not. time < huge(time)) return
          ! Touching, but past the end of the surface that would hold it.
          if (time*maxval(abs(direction)) <= in_the_way*maxval(bodies%size(free%member))) return

@@ -3,13 +3,15 @@
 module emcon_penalty
    use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_contact, only : contact_t
-   use emcon_contact_law, only : contact_law_t, contact_place_t
+   use emcon_constraint, only : contact_response_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
    use emcon_contact_law_registry, only : contact_law_of_method
    use emcon_errors, only : err_input, error_t, raise
    use emcon_gaps, only : pair_measure, pair_search
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t, where_text
+   use emcon_state, only : contact_state_t
    use emcon_steps, only : method_augmented_lagrange, method_penalty, step_is_dynamic, step_t
    use emcon_system, only : system_t
    use emcon_term_registry, only : terms_mass_rows
@@ -17,7 +19,7 @@ module emcon_penalty
    implicit none
    private
    public :: penalty_state_t, penalty_begin_step, penalty_forget, penalty_select, penalty_augment, &
-      penalty_start, penalty_stored, penalty_depth, penalty_keep, penalty_owes
+      penalty_free, penalty_start, penalty_stored, penalty_depth, penalty_keep, penalty_owes
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
@@ -175,11 +177,12 @@ contains
       has_own_law = allocated(contact%laws%row) .and. .not. self%augments
    end function has_own_law
 
-   !> What is closed as the analysis begins, and what it stores there.
-   subroutine penalty_start(self, system, motion, closure, energy)
+   !> What is closed as pairs begin to act, and what it stores there.
+   subroutine penalty_start(self, system, motion, begins, closure, energy)
       type(penalty_state_t), intent(in) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion       !! none, at the start
+      logical, intent(in) :: begins(:)           !! (n_pair) those to look at
       real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
       real(wp), intent(out) :: energy            !! [M L^2/T^2]
       class(contact_law_t), allocatable :: law
@@ -189,7 +192,7 @@ contains
       energy = 0.0_wp
       if (.not. self%is_on) return
       do k = 1, system%n_pair
-         if (.not. has_own_law(self, system%contact(k)%contact)) cycle
+         if (.not. (begins(k) .and. has_own_law(self, system%contact(k)%contact))) cycle
          call pair_search(system, k, motion)
          call pair_measure(system, k, motion%x, motion%u0, motion%du)
          associate (contact => system%contact(k)%contact)
@@ -211,6 +214,38 @@ contains
          end associate
       end do
    end subroutine penalty_start
+
+   !> What contact `k` has stored at the end of the last step.
+   subroutine penalty_free(self, system, k, contacts, energy)
+      type(penalty_state_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: k                   !! number of the contact
+      type(contact_state_t), intent(in) :: contacts
+      real(wp), intent(out) :: energy            !! [M L^2/T^2]
+      class(contact_law_t), allocatable :: law
+      type(contact_place_t) :: place
+      type(contact_values_t) :: at
+      type(contact_response_t) :: response
+      integer :: i, id
+
+      energy = 0.0_wp
+      if (.not. self%is_on .or. self%augments) return
+      associate (contact => system%contact(k)%contact)
+         do i = 1, contact%n_constraint
+            id = system%first_constraint(k) + i
+            if (.not. contacts%closure(id) < 0.0_wp) cycle
+            place = contact_place_t(self%area(id), self%stiffness(id), contact%share(i), &
+               contacts%closure(id))
+            if (allocated(self%stretch)) place%stretch = contacts%stretch(:, id)
+            call give_law(self, contact, law)
+            call law%begin(place)
+            at%gap0 = place%closure/place%share
+            at%gap1 = at%gap0
+            call law%respond(at, response)
+            energy = energy + law%stored()
+         end do
+      end associate
+   end subroutine penalty_free
 
    !> The stiffness at the nodes of contact `k`, or else of the other side.
    pure real(wp) function of_either(system, scene, k, inner) result(total)

@@ -56,6 +56,7 @@ module emcon_contact
       logical :: has_compliance = .false.             !! by a penalty, or augmented
       logical :: is_penalty = .false.                 !! it stores what it takes: a penalty
       real(wp) :: engages = 0.0_wp                    !! the gap at which that begins, if > 0 [L]
+      logical :: is_idle = .false.                    !! it does not act: nothing is near
       !> (n_constraint) it is measured if it is near, whether or not it may close in the step; not
       !> allocated: none of them
       logical, allocatable :: is_watched(:)
@@ -300,7 +301,11 @@ contains
       class(contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
 
-      if (self%midside%n == 0) then
+      if (self%step%is_idle) then
+         self%state%is_near = .false.
+         self%state%is_over = .false.
+         call self%has_looked(huge(1.0_wp))
+      else if (self%midside%n == 0) then
          call self%begin_points(x, u0, du)
       else
          call self%begin_points(x, midside_points(self%midside, u0), &
@@ -314,6 +319,7 @@ contains
       class(contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
 
+      if (self%step%is_idle) return
       if (self%midside%n == 0) then
          call self%measure_points(x, u0, du)
       else
@@ -401,6 +407,9 @@ contains
       real(wp), intent(out) :: of_multiplier(:)  !! (n_constraint) [L^2]
       real(wp), intent(out) :: length(:)         !! (n_constraint) [L]
 
+      of_multiplier = 0.0_wp
+      length = 0.0_wp
+      if (self%step%is_idle) return
       if (self%midside%n == 0) then
          call self%area_points(x, u, of_multiplier, length)
          call self%narrow(x, u, of_multiplier)

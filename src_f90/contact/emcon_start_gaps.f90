@@ -57,13 +57,14 @@ module emcon_start_gaps
          type(scene_t), intent(in) :: scene
       end subroutine measure_interface
 
-      !> The way of node `i` off its surface as last measured, along the normal: without it the gap
-      !> is closed, to first order.
-      pure subroutine offset_interface(self, i, scene, offset, is_last)
+      !> The way of node `i` off the place with the gap `gap` in front of its surface, as last
+      !> measured, along the normal: without it that is the gap, to first order.
+      pure subroutine offset_interface(self, i, scene, gap, offset, is_last)
          import :: scene_t, start_gaps_t, wp
          class(start_gaps_t), intent(inout) :: self
          integer, intent(in) :: i                !! 1..n
          type(scene_t), intent(in) :: scene
+         real(wp), intent(in) :: gap             !! that is wanted [L]
          real(wp), intent(out) :: offset(:)      !! (n_dim) [L]
          logical, intent(out) :: is_last         !! it is round-off
       end subroutine offset_interface

@@ -84,19 +84,20 @@ contains
          self%nts%master, self%facet)
    end subroutine measure
 
-   pure subroutine offset_off(self, i, scene, offset, is_last)
+   pure subroutine offset_off(self, i, scene, gap, offset, is_last)
       class(start_gaps_plane_t), intent(inout) :: self
       integer, intent(in) :: i                   !! 1..n
       type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: gap                !! that is wanted [L]
       real(wp), intent(out) :: offset(:)         !! (2) [L]
       logical, intent(out) :: is_last            !! it is round-off
       type(condition_t) :: item(1)
 
       call self%nts%evaluate_points([i], scene%x, self%u, self%still, [0.0_wp], item)
       associate (normal => item(1)%c(:, 1))
-         offset = item(1)%gap1*normal/dot_product(normal, normal)
+         offset = (item(1)%gap1 - gap)*normal/dot_product(normal, normal)
       end associate
-      is_last = abs(item(1)%gap1) <= epsilon(1.0_wp)*item(1)%size
+      is_last = abs(item(1)%gap1 - gap) <= epsilon(1.0_wp)*item(1)%size
    end subroutine offset_off
 
    pure logical function faces(self, i, scene)

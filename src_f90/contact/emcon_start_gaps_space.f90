@@ -227,17 +227,18 @@ contains
       end associate
    end function state_of
 
-   pure subroutine offset_off(self, i, scene, offset, is_last)
+   pure subroutine offset_off(self, i, scene, gap, offset, is_last)
       class(start_gaps_space_t), intent(inout) :: self
       integer, intent(in) :: i                   !! 1..n
       type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: gap                !! that is wanted [L]
       real(wp), intent(out) :: offset(:)         !! (3) [L]
       logical, intent(out) :: is_last            !! it is round-off
 
       associate (place => place_of(self, i, scene), foot => self%foot(i))
          call signed_distance_to(self%side(self%of_foot(i))%at, (foot%simplex), place, foot)
-         offset = (foot%distance - self%pad)*foot%way
-         is_last = abs(foot%distance - self%pad) <= epsilon(1.0_wp)*maxval(abs(place))
+         offset = (foot%distance - self%pad - gap)*foot%way
+         is_last = abs(foot%distance - self%pad - gap) <= epsilon(1.0_wp)*maxval(abs(place))
       end associate
    end subroutine offset_off
 

@@ -117,17 +117,18 @@ contains
       self%facet = merge(1, 0, self%state%is_near)
    end subroutine measure
 
-   pure subroutine offset_off(self, i, scene, offset, is_last)
+   pure subroutine offset_off(self, i, scene, gap, offset, is_last)
       class(start_gaps_wall_t), intent(inout) :: self
       integer, intent(in) :: i                   !! 1..n
       type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: gap                !! that is wanted [L]
       real(wp), intent(out) :: offset(:)         !! (3) [L]
       logical, intent(out) :: is_last            !! it is round-off
 
       call look(self, i, scene)
-      offset = self%state(i)%gap0*self%spot(i)%normal
-      is_last = abs(self%state(i)%gap0) <= epsilon(1.0_wp)*maxval(abs(scene%x(:, self%node(i)) &
-         + scene%u0(:, self%node(i))))
+      offset = (self%state(i)%gap0 - gap)*self%spot(i)%normal
+      is_last = abs(self%state(i)%gap0 - gap) <= epsilon(1.0_wp)*maxval(abs( &
+         scene%x(:, self%node(i)) + scene%u0(:, self%node(i))))
    end subroutine offset_off
 
    pure logical function faces(self, i, scene)

@@ -13,6 +13,7 @@ module emcon_deck
    use emcon_deck_check_rigid, only : check_rigid
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
+   use emcon_deck_clearance, only : read_clearances
    use emcon_deck_contact, only : read_interactions, read_pairs
    use emcon_deck_contact_space, only : check_contact_space
    use emcon_deck_dimension, only : check_dimension, find_dimension, is_axial_deck, n_plane, &
@@ -27,6 +28,7 @@ module emcon_deck
    use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
+   use emcon_deck_model_change, only : read_model_changes
    use emcon_deck_parts, only : parts_are_used, parts_flatten
    use emcon_deck_reader, only : reader_t
    use emcon_deck_rigid, only : read_rigid_bodies
@@ -116,6 +118,8 @@ contains
       call read_initial_conditions(reader, scene)
       call read_interactions(reader)
       call read_pairs(reader, scene)
+      call read_clearances(reader, scene)
+      call read_model_changes(reader, scene)
       call read_ties(reader, scene)
       call read_general_contact(reader, scene)
       call read_equations(reader, scene)

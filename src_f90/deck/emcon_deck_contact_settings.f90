@@ -7,7 +7,7 @@ module emcon_deck_contact_settings
       option_real, option_word, reader_t, refuse_option
    use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : add_error, quoted, suggestion
-   use emcon_interactions, only : contact_pair_t
+   use emcon_interactions, only : contact_pair_t, pair_begins
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find
    use emcon_options, only : option_default
@@ -82,7 +82,7 @@ contains
       where (step_is_dynamic(step)) step%contact%initiation = initiation_massless
    end subroutine pairs_ask
 
-   !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
+   !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in a step in which pairs begin to act.
    subroutine read_interference(reader, card, pair, amplitude, step)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -93,8 +93,9 @@ contains
 
       if (.not. has_option(card, "SHRINK")) call card_error(reader, card, "SHRINK is missing: " &
          // "only the overclosure that is there at the start can be resolved")
-      if (card%step > 1) call card_error(reader, card, "it belongs into the first step: later " &
-         // "ones begin without overclosure")
+      if (card%step > 1 .and. .not. any(pair_begins(pair, card%step))) call card_error(reader, &
+         card, "it belongs into the first step, or into one in which *MODEL CHANGE, ADD takes " // &
+         "pairs in: others begin without overclosure")
       if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
       step%contact%resolves_overclosure = .true.

@@ -93,6 +93,8 @@ module emcon_deck_keywords
          // "ADJUST=,INITIATION=,TIED,~SMALLSLIDING,~NOTHICKNESS,~SMOOTH," &
          // "~MECHANICALCONSTRAINT:KINEMATIC,~CPSET,~WEIGHT,~TRACKING,~GEOMETRICCORRECTION," &
          // "~SUPPLEMENTARYCONSTRAINTS,~HCRIT,~EXTENSIONZONE,~OP:NEW"), &
+      keyword_t("CLEARANCE", in_model, "MASTER=,SLAVE=,VALUE=,!TABULAR,!BOLT,!CPSET," &
+         // "!SEARCHNSET", has_data=.false.), &
       keyword_t("CONTACT", in_model, "~OP:NEW", has_data=.false.), &
       keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR,TYPE="), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
@@ -104,6 +106,7 @@ module emcon_deck_keywords
       keyword_t("EQUATION", in_both, "REMOVE,REMOVEALL,!INPUT"), &
       keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,TYPE=,~OP:NEW"), &
+      keyword_t("MODEL CHANGE", in_step, "TYPE=,ADD,REMOVE,~ACTIVATE"), &
       keyword_t("CHANGE FRICTION", in_step, "INTERACTION=,RESET,!AMPLITUDE,!ELEMENTSET," &
          // "!NODESET", has_data=.false.), &
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,~MASTER,~SLAVE," &
@@ -204,15 +207,15 @@ module emcon_deck_keywords
       refusal_t(gap_instead, "GAP"), &
       refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &
       refusal_t("use TYPE of *CONTACT INCLUSIONS", "CONTACT FORMULATION"), &
-      refusal_t("use ADJUST of *CONTACT PAIR", "CLEARANCE,CONTACT INITIALIZATION DATA," &
+      refusal_t("use *CLEARANCE, or ADJUST of *CONTACT PAIR", "CONTACT INITIALIZATION DATA," &
          // "CONTACT INITIALIZATION ASSIGNMENT"), &
       refusal_t("use *CONTACT CONTROLS, STABILIZE", "CONTACT STABILIZATION,CONTACT CONTROLS " &
          // "ASSIGNMENT"), &
       refusal_t("faces of solids have no thickness", "SURFACE PROPERTY ASSIGNMENT", &
          is_idle=.true.), &
       refusal_t("nothing damps but *DAMPING", "BULK VISCOSITY", is_idle=.true.), &
-      refusal_t("pairs and elements stay as they are for the whole run", "MODEL CHANGE,CHANGE " &
-         // "CONTACT TYPE,CHANGE SURFACE BEHAVIOR,CHANGE MATERIAL"), &
+      refusal_t("pairs and materials stay as they are; *MODEL CHANGE takes pairs out or in", &
+         "CHANGE CONTACT TYPE,CHANGE SURFACE BEHAVIOR,CHANGE MATERIAL"), &
       refusal_t("prescribe displacements by *BOUNDARY", "PRE-TENSION SECTION"), &
       refusal_t("all sectors of a model deform alike", "SELECT CYCLIC SYMMETRY MODES"), &
       refusal_t("move the nodes in *NODE", "IMPERFECTION"), &

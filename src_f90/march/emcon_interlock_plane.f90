@@ -5,7 +5,8 @@
 !> friction by nothing. Source: docs/theory.md, section 4.13.
 module emcon_interlock_plane
    use emcon_coulomb_law, only : contact_slides
-   use emcon_interactions, only : contact_options_t, interaction_friction, smoothing_none
+   use emcon_interactions, only : contact_options_t, interaction_friction, pair_acts, &
+      smoothing_none
    use emcon_kinds, only : wp
    use emcon_march_types, only : increment_t, march_t
    use emcon_scene, only : scene_t
@@ -36,6 +37,7 @@ contains
                march%state%clock%i_step), &
                knows => march%active%friction%knows_corners(pair))
             if (knows .or. .not. mu > 0.0_wp) cycle
+            if (.not. pair_acts(scene%pair(pair), march%state%clock%i_step)) cycle
             spread = spread_of(march, pair)
             if (.not. spread > told_part*mu) cycle
             turn = turn_of(march, scene, pair)

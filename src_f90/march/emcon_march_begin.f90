@@ -13,7 +13,8 @@ module emcon_march_begin
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
    use emcon_friction, only : friction_suit
-   use emcon_interactions, only : contact_options_t
+   use emcon_interactions, only : contact_options_t, pair_acts, pair_begins, pair_first_step, &
+      pair_is_reverse_of
    use emcon_overlap_check, only : overlap_check_excuse, overlap_check_smooth, overlap_check_step, &
       overlap_t
    use emcon_kinds, only : wp
@@ -34,7 +35,7 @@ module emcon_march_begin
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_user
-   use emcon_penalty, only : penalty_begin_step, penalty_start
+   use emcon_penalty, only : penalty_begin_step, penalty_free, penalty_start
    use emcon_solver_registry, only : solver_user
    use emcon_start_overlap, only : start_overlap_check
    use emcon_state, only : state_t
@@ -79,6 +80,7 @@ contains
       self%state%explicit%critical_h = 0.0_wp
       call march_past_forget(self%state)
       if (.not. step_is_dynamic(scene%step(i_step))) self%state%v = 0.0_wp
+      call release_contact(self, scene)
       call system_begin_step(self%system, scene, i_step, error)
       if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
          self%system%notes, error)
@@ -88,8 +90,51 @@ contains
       call check_held(self, scene, error)
       if (allocated(error)) return
       call prepare(self, scene, error)
+      if (.not. allocated(error)) call begin_pairs(self, scene, error)
       if (.not. allocated(error)) call quasi_static_begin(self, scene)
    end subroutine march_begin_step
+
+   !> Contact that does not act in the step lets go. What it has stored goes out of the system, as
+   !> work of whoever takes it away.
+   subroutine release_contact(self, scene)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp) :: energy
+      integer :: k
+
+      do k = 1, size(self%system%contact)
+         if (pair_acts(scene%pair(abs(self%system%contact(k)%of_pair)), &
+            self%state%clock%i_step)) cycle
+         associate (first => self%system%first_constraint(k) + 1, &
+               last => self%system%first_constraint(k + 1))
+            call penalty_free(self%active%penalty, self%system, k, self%state%contacts, energy)
+            call self%state%contacts%release(first, last)
+         end associate
+         self%ledger%contact_energy = self%ledger%contact_energy - energy
+         self%ledger%external_work = self%ledger%external_work - energy
+      end do
+   end subroutine release_contact
+
+   !> Contact that begins to act with the step: bodies may not be in each other unless the step
+   !> resolves that, and what it stores is work of whoever brings it.
+   subroutine begin_pairs(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: energy
+
+      associate (i_step => self%state%clock%i_step, state => self%state)
+         if (.not. any(pair_begins(scene%pair, i_step))) return
+         if (.not. scene%step(i_step)%contact%resolves_overclosure) call start_overlap_check(self, &
+            scene, error)
+         if (allocated(error)) return
+         call penalty_start(self%active%penalty, self%system, motion_of(evaluation_at_end, &
+            scene%x, state%u, at_rest(state%u)), pair_begins(scene%pair, i_step), &
+            state%contacts%closure, energy)
+      end associate
+      self%ledger%contact_energy = self%ledger%contact_energy + energy
+      self%ledger%external_work = self%ledger%external_work + energy
+   end subroutine begin_pairs
 
    !> In statics no body may be free to move, in dynamics none without mass.
    subroutine check_held(self, scene, error)
@@ -202,7 +247,8 @@ contains
          if (allocated(error)) return
          if (state%clock%i_step == 1 .and. .not. state%clock%time > 0.0_wp) call penalty_start( &
             self%active%penalty, self%system, motion_of(evaluation_at_end, scene%x, state%u, &
-            at_rest(state%u)), state%contacts%closure, self%ledger%contact_energy)
+            at_rest(state%u)), pair_acts(scene%pair, 1), state%contacts%closure, &
+            self%ledger%contact_energy)
          call near_laws_begin_step(self%active%near_laws, self%system, scene, step)
          call begin_overclosure(self, scene, step)
          if (state%clock%i_step == 1 .and. .not. (state%clock%time > 0.0_wp &
@@ -228,24 +274,45 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_options_t) :: options
       real(wp) :: change, interference
-      integer :: i
+      integer :: i, first
 
       do i = 1, size(self%system%contact)
          options = scene%step(self%state%clock%i_step)%contact%options
          if (i <= size(scene%pair)) then
             if (scene%pair(i)%has_options) options = scene%pair(i)%options
          end if
-         associate (contact => self%system%contact(i)%contact)
+         associate (contact => self%system%contact(i)%contact, &
+               pair => scene%pair(abs(self%system%contact(i)%of_pair)))
+            contact%step%is_idle = .not. pair_acts(pair, self%state%clock%i_step)
+            contact%clearance = 0.0_wp
             call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
             call contact%configure(scene%x, options)
-            if (.not. scene%step(1)%contact%resolves_overclosure) cycle
+            first = pair_first_step(pair)
+            if (contact%step%is_idle .and. i <= size(scene%pair)) call tell_idle(self, scene, i)
+            if (contact%step%is_idle) cycle
+            if (.not. scene%step(first)%contact%resolves_overclosure) cycle
             call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change, &
                interference)
          end associate
-         if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%clock%i_step > 1) cycle
+         if (i > size(scene%pair) .or. .not. change > 0.0_wp &
+            .or. self%state%clock%i_step > first) cycle
          call tell_curves(self, scene, i, change, interference)
       end do
    end subroutine configure_contact
+
+   !> Say that a pair does not act in the step.
+   subroutine tell_idle(self, scene, i)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i                   !! 1 to the number of pairs
+
+      associate (pair => scene%pair(i))
+         if (any(pair_is_reverse_of(scene%pair(:i - 1), pair))) return
+         call note_add(self%system%notes, "contact of surfaces " // &
+            scene%surface(pair%slave)%name // " and " // scene%surface(pair%master)%name // &
+            " does not act in this step")
+      end associate
+   end subroutine tell_idle
 
    !> Say that gaps of a pair follow arcs, and where that is not known well enough.
    subroutine tell_curves(self, scene, i, change, interference)
@@ -283,6 +350,7 @@ contains
       call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
          step%contact%resolves_overclosure)
       self%overlap_check%meant_overlap = 0.0_wp
+      call self%overlap_check%query%take_pairs(pair_acts(scene%pair, self%state%clock%i_step))
       call overlap_check_smooth(self%overlap_check, scene, step%contact%options)
       call overlap_check_excuse(self%overlap_check, scene%x, self%state%u_start, overlap)
       if (overlap%depth > touching_bar) call warn_of_overlap(self, scene, overlap)
@@ -297,11 +365,13 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(overlap_t), intent(in) :: overlap
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, which
 
       call overlap_text(overlap, scene%node%label, self%system%space%body, text)
+      which = "*CONTACT PAIR"
+      if (self%overlap_check%query%has_idle()) which = which // " that acts"
       call note_add(self%warnings, overlap_at_start // ", by " // to_text(overlap%depth, 3) // &
-         " of an edge, " // text // ": no *CONTACT PAIR names the two, and their " // &
+         " of an edge, " // text // ": no " // which // " names the two, and their " // &
          "overlap is not checked from here on")
    end subroutine warn_of_overlap
 

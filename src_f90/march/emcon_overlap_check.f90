@@ -7,7 +7,7 @@
 module emcon_overlap_check
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_guards, only : touching_bar
-   use emcon_interactions, only : contact_options_t
+   use emcon_interactions, only : contact_options_t, pair_acts
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_midside_plane, only : midside_init, midside_points, midside_stretch, midside_t
@@ -63,6 +63,7 @@ contains
       type(surface_t) :: outline
 
       call new_overlap_query(scene, self%query)
+      call self%query%take_pairs(pair_acts(scene%pair, 1))
       associate (mesh => self%query%outline)
          self%n_piece = mesh%n_piece
          self%n_facet = size(mesh%facet, 2)
@@ -117,7 +118,7 @@ contains
          call find_later(self, tree, p, n)
          do i = 1, n
             if (self%query%outline%body(p) == self%query%outline%body(self%other(i))) cycle
-            if (outline_meets(self%query%outline, p, self%other(i))) cycle
+            if (outline_meets(self%query%outline, p, self%other(i), self%query%acts)) cycle
             overlap = overlap_t()
             call overlap_check_pieces(self, p, self%other(i), x, u, rest, overlap)
             ! Bodies that touch are in each other by round-off, and are not meant to go on.
@@ -205,7 +206,7 @@ contains
          call find_later(self, tree, p, n)
          do i = 1, n
             if (is_excused(self, p, self%other(i))) cycle
-            if (outline_meets(self%query%outline, p, self%other(i))) then
+            if (outline_meets(self%query%outline, p, self%other(i), self%query%acts)) then
                call overlap_check_pieces(self, p, self%other(i), x, u0, du, overlap)
             else
                call overlap_check_pieces(self, p, self%other(i), x, u0, du, self%stray)
@@ -256,7 +257,7 @@ contains
          is_excused = body(p) == body(q) .or. &
             any(self%excused%first == p .and. self%excused%second == q)
       end associate
-      if (is_excused) is_excused = .not. outline_meets(self%query%outline, p, q)
+      if (is_excused) is_excused = .not. outline_meets(self%query%outline, p, q, self%query%acts)
    end function is_excused
 
    !> Smallest distance of the boxes of two pieces that are looked at, by the axis where it is

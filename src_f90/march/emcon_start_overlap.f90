@@ -1,6 +1,6 @@
 !> Bodies in contact that are in each other before the first step with no node behind a surface, as
-!> edges that cross or bodies whose faces lie in the same planes. What nodes penetrate is told
-!> before, with the gaps.
+!> edges that cross or bodies whose faces lie in the same planes: what nodes penetrate is told
+!> before, with the gaps. And bodies that are in each other as a later step takes their pair in.
 module emcon_start_overlap
    use emcon_errors, only : err_input, error_t, raise
    use emcon_guards, only : touching_bar
@@ -21,11 +21,11 @@ contains
 
    !> Is a body by more in another than its contacts let it, so that the run could not become good?
    subroutine start_overlap_check(march, scene, error)
-      type(march_t), intent(inout) :: march      !! at the start of the first step
+      type(march_t), intent(inout) :: march      !! at the start of a step
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(overlap_t) :: overlap
-      character(len=:), allocatable :: cure, text, title
+      character(len=:), allocatable :: cure, text, title, when
       real(wp) :: bar
       integer :: k
 
@@ -42,17 +42,23 @@ contains
       k = pair_of(scene, march%system%space%body, overlap)
       if (k == 0) return
       call overlap_text(overlap, scene%node%label, march%system%space%body, text)
+      associate (i_step => march%state%clock%i_step)
+         when = "at the start"
+         if (i_step > 1) when = "as step " // to_text(i_step) // " takes their pair in,"
+      end associate
       if (overlap%is_beside) text = text // "; no node of one need be in the other, as where " // &
          "edges cross or faces lie in one plane"
       associate (pair => scene%pair(k))
          cure = "; move the bodies apart"
+         if (march%state%clock%i_step > 1) cure = cure // " before, or let a *STATIC step " // &
+            "with *CONTACT INTERFERENCE, SHRINK take it in"
          if (allocated(scene%surface(pair%master)%wall)) cure = cure // ", or turn the wall " // &
             "round, so that its normal points to the other side"
          title = "surface " // scene%surface(pair%slave)%name
          if (pair%slave /= pair%master) title = title // " and of surface " // &
             scene%surface(pair%master)%name
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: bodies of " // &
-            title // " overlap at the start by " // to_text(overlap%depth, 3) // " of an edge: " &
+            title // " overlap " // when // " by " // to_text(overlap%depth, 3) // " of an edge: " &
             // text // cure)
       end associate
    end subroutine start_overlap_check

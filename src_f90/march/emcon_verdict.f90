@@ -49,6 +49,8 @@ module emcon_verdict
    real(wp), parameter :: most_turn = 0.2_wp
    character(len=*), parameter :: unpaired = ": no *CONTACT PAIR names the two; add one, or " // &
       "name all by *CONTACT"
+   character(len=*), parameter :: idle_pair = ": no *CONTACT PAIR that acts then " // &
+      "names the two"
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
 
@@ -281,7 +283,11 @@ contains
                self%overlap%place)
          else
             call overlap_text(stray, scene%node%label, march%system%space%body, self%overlap%place)
-            self%overlap%place = self%overlap%place // unpaired
+            if (march%overlap_check%query%has_idle()) then
+               self%overlap%place = self%overlap%place // idle_pair
+            else
+               self%overlap%place = self%overlap%place // unpaired
+            end if
          end if
       end associate
       if (self%overlap%deepest > most_overlap(self)) call tell_own(self, scene, march, increment)

@@ -8,8 +8,9 @@ module emcon_initial_contact
    use emcon_facets, only : facets_length, facets_text
    use emcon_guards, only : guard_slack
    use emcon_host, only : host_find_contact, host_t
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user, &
-      formulation_nts, pair_has_order, pair_holds_nodes, pair_may_exchange
+   use emcon_interactions, only : adjustment_moves, contact_options_t, contact_pair_t, &
+      formulation_user, formulation_nts, pair_acts, pair_has_order, pair_holds_nodes, &
+      pair_may_exchange
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
@@ -69,20 +70,22 @@ contains
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
             if (pair%formulation == formulation_user) then
-               if (.not. is_meant) call check_given(scene, i, options, noise, error, host)
+               if (pair_acts(pair, 1) .and. .not. is_meant) call check_given(scene, i, options, &
+                  noise, error, host)
                if (allocated(error)) return
                cycle
             end if
             call let_wait(scene, pair, notes)
             call new_start_gaps(scene, pair, contact, error, options)
             if (allocated(error)) return
-            if (.not. contact%is_self) call check_two(scene, pair, contact, noise, is_checked, &
-               error)
+            if (pair_acts(pair, 1) .and. .not. contact%is_self) call check_two(scene, pair, &
+               contact, noise, is_checked, error)
             if (allocated(error)) return
-            if (pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0) then
+            if (adjustment_moves(pair%adjust)) then
                call adjust_pair(scene, pair, contact, notes)
                noise = coordinate_noise(scene)
             end if
+            if (.not. pair_acts(pair, 1)) cycle   ! what is closed when it begins is looked at then
             ! Bodies of one surface may cross each other where their overlap is to be resolved.
             if (contact%is_self .and. .not. (is_meant .and. pair_holds_nodes(pair))) then
                call check_crossing(scene, pair%slave, contact, is_slave, is_checked, error)
@@ -308,8 +311,9 @@ contains
       coordinate_noise = rounding*maxval(abs(scene%x))
    end function coordinate_noise
 
-   !> Put the slave nodes within ADJUST= of the surface, and those behind it, onto it, free of
-   !> stress: along the normal, in the reference configuration. Of two nodes at one place of a
+   !> Put the slave nodes within ADJUST= of the surface, and those behind it, onto it, or those that
+   !> face it to their *CLEARANCE, free of stress: along the normal, in the reference configuration.
+   !> Of two nodes at one place of a
    !> surface of tied pieces the other one goes along.
    subroutine adjust_pair(scene, pair, contact, notes)
       type(scene_t), intent(inout) :: scene
@@ -329,13 +333,14 @@ contains
          if (contact%facet(i) == 0) cycle
          state = contact%state(i)
          is_meant = state%gap0 <= pair%adjust%distance
+         if (pair%adjust%is_clearance) is_meant = contact%faces(i, scene)
          if (pair%adjust%set > 0) is_meant = &
             find_sorted(scene%set%node(pair%adjust%set)%item, contact%node(i)) > 0
          if (.not. (state%is_over .and. is_meant)) cycle
-         largest = max(largest, abs(state%gap0))
+         largest = max(largest, abs(state%gap0 - pair%adjust%clearance))
          n_moved = n_moved + 1
          do k = 1, most_moves
-            call contact%offset(i, scene, offset, is_last)
+            call contact%offset(i, scene, pair%adjust%clearance, offset, is_last)
             associate (node => contact%node(i), duplicate => contact%duplicate(i))
                scene%x(:, node) = scene%x(:, node) - offset
                if (duplicate > 0) scene%x(:, duplicate) = scene%x(:, duplicate) - offset
@@ -343,7 +348,8 @@ contains
             if (is_last) exit
          end do
       end do
-      text = where_text(scene, pair%origin) // ": ADJUST"
+      text = where_text(scene, pair%origin) // ": " // trim(merge("*CLEARANCE", "ADJUST    ", &
+         pair%adjust%is_clearance))
       if (pair%origin%file == 0) text = "contact of surfaces " // &
          scene%surface(pair%slave)%name // " and " // scene%surface(pair%master)%name // ": adjust"
       call note_add(notes, text // " moves " // to_text(n_moved) // " slave nodes, by " // &

@@ -173,19 +173,27 @@ contains
       if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "SCHEME=ENERGY DECAYING took " // &
          to_text(ledger%decay, 9))
       if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "damping took " // &
-         to_text(ledger%damping, 9))
+         to_text(resolved(self, ledger%damping), 9))
       if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took " // &
-         to_text(ledger%friction, 9) // "; friction law satisfied to " // &
+         to_text(resolved(self, ledger%friction), 9) // "; friction law satisfied to " // &
          to_text(verdict_law_violation(self), 2) // " of the largest force, " // &
          to_text(verdict_jump_violation(self), 2) // " with jumps of velocity")
       if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
-         to_text(ledger%contact_damping, 9))
+         to_text(resolved(self, ledger%contact_damping), 9))
       if (self%penalty%give > 0.0_wp) call note_add(lines, "largest penetration of contact " // &
          to_text(self%penalty%give, 3) // " of an edge, at time " // to_text(self%penalty%time, &
          9) // "; stored at the end " // to_text(ledger%contact_energy, 9))
       if (self%penalty%most_augmentations > 0) call note_add(lines, "augmentations " // &
          to_text(self%penalty%most_augmentations) // " at most in a solve")
    end subroutine add_losses
+
+   !> A loss as it is told: 0 where it is not more than the works of the run are rounded by.
+   pure real(wp) function resolved(self, loss)
+      type(verdict_t), intent(in) :: self
+      real(wp), intent(in) :: loss               !! [M L^2/T^2]
+
+      resolved = merge(loss, 0.0_wp, abs(loss) > energy_rounding(self%energy))
+   end function resolved
 
    !> Whether overlap was looked for, and the deepest.
    subroutine add_checked(self, march, lines)

@@ -8,6 +8,7 @@ module emcon_interactions
    public :: pressure_t, pressure_reach, pressure_slope, interaction_reach, interaction_friction
    public :: pressure_hard, pressure_linear, pressure_exponential, pressure_tabular, pressure_tied
    public :: pair_has_order, pair_holds_nodes, pair_may_exchange, pair_is_reverse_of, pair_of_one
+   public :: adjustment_moves, pair_acts, pair_begins, pair_first_step
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user, &
       formulation_edges
    public :: integration_segments, integration_elements
@@ -70,10 +71,13 @@ module emcon_interactions
       type(pressure_t) :: pressure
    end type interaction_t
 
-   !> Nodes of a slave surface that are moved onto the master before the first step.
+   !> Nodes of a slave surface that are moved before the first step, onto the master or to a
+   !> clearance in front of it.
    type :: adjustment_t
       real(wp) :: distance = -1.0_wp                 !! ADJUST=distance [L]; < 0: not given
       integer :: set = 0                             !! ADJUST=node set; 0: not given
+      logical :: is_clearance = .false.              !! *CLEARANCE: all nodes that face the master
+      real(wp) :: clearance = 0.0_wp                 !! and their gap then, < 0: overlap [L]
    end type adjustment_t
 
    type :: contact_pair_t
@@ -95,6 +99,7 @@ module emcon_interactions
       type(adjustment_t) :: adjust
       logical :: has_options = .false.               !! of its own, in place of the step's
       type(contact_options_t) :: options
+      logical, allocatable :: acts_in_step(:)        !! (n_step) not allocated: in all of them
    end type contact_pair_t
 
 contains
@@ -138,6 +143,32 @@ contains
       reach = max(surface%damping%clearance, pressure_reach(surface%pressure))
    end function interaction_reach
 
+   !> Does a pair act in a step?
+   elemental logical function pair_acts(pair, i_step) result(acts)
+      type(contact_pair_t), intent(in) :: pair
+      integer, intent(in) :: i_step              !! of the deck
+
+      acts = .true.
+      if (allocated(pair%acts_in_step)) acts = pair%acts_in_step(i_step)
+   end function pair_acts
+
+   !> Does it act in a step, after one in which it did not?
+   elemental logical function pair_begins(pair, i_step) result(begins)
+      type(contact_pair_t), intent(in) :: pair
+      integer, intent(in) :: i_step              !! of the deck
+
+      begins = .false.
+      if (i_step > 1) begins = pair_acts(pair, i_step) .and. .not. pair_acts(pair, i_step - 1)
+   end function pair_begins
+
+   !> The first step in which it acts; 0: it never does.
+   elemental integer function pair_first_step(pair) result(i_step)
+      type(contact_pair_t), intent(in) :: pair
+
+      i_step = 1
+      if (allocated(pair%acts_in_step)) i_step = findloc(pair%acts_in_step, .true., 1)
+   end function pair_first_step
+
    !> Does a pair hold each node of its slave in front of its master?
    elemental logical function pair_holds_nodes(pair) result(holds_nodes)
       type(contact_pair_t), intent(in) :: pair
@@ -171,12 +202,19 @@ contains
       pair_of_one%is_guarded = .false.
    end function pair_of_one
 
+   !> Does it move nodes?
+   elemental logical function adjustment_moves(adjust) result(moves)
+      type(adjustment_t), intent(in) :: adjust
+
+      moves = adjust%distance >= 0.0_wp .or. adjust%set > 0 .or. adjust%is_clearance
+   end function adjustment_moves
+
    !> Does the deck leave it open which one that is? What is adjusted is the slave.
    elemental logical function pair_may_exchange(pair) result(may_exchange)
       type(contact_pair_t), intent(in) :: pair
 
       may_exchange = pair%may_choose .and. pair_has_order(pair) .and. &
-         .not. (pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0)
+         .not. adjustment_moves(pair%adjust)
    end function pair_may_exchange
 
 end module emcon_interactions

@@ -45,6 +45,7 @@ module emcon_state
    contains
       procedure :: begin => contacts_begin
       procedure :: clear => contacts_clear
+      procedure :: release => contacts_release
       procedure :: keep => contacts_keep
       procedure :: get => contacts_get
       procedure :: take => contacts_take
@@ -110,6 +111,20 @@ contains
       self%slides_along = 0.0_wp
       self%drag = 0.0_wp
    end subroutine contacts_clear
+
+   !> The same of constraints `first` to `last` alone.
+   pure subroutine contacts_release(self, first, last)
+      class(contact_state_t), intent(inout) :: self
+      integer, intent(in) :: first, last         !! numbers of constraints
+
+      self%is_active(first:last) = .false.
+      self%lam(first:last) = 0.0_wp
+      self%closure(first:last) = 0.0_wp
+      self%stretch(:, first:last) = 0.0_wp
+      if (size(self%slides_along) == 0) return
+      self%slides_along(:, first:last) = 0.0_wp
+      self%drag(:, first:last) = 0.0_wp
+   end subroutine contacts_release
 
    !> What constraint `id` ends a step with.
    pure subroutine contacts_keep(self, id, lam, acts)

@@ -1,6 +1,6 @@
 !> When surfaces that move along a given way touch for the first time, however far apart they are.
 module emcon_first_touch_plane
-   use emcon_interactions, only : formulation_user
+   use emcon_interactions, only : formulation_user, pair_acts
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
@@ -15,11 +15,12 @@ module emcon_first_touch_plane
 
 contains
 
-   !> The first time at which a node of a contact pair passes through an edge of the other surface
-   !> from outside, or the layer in front of it; huge if that never happens. Every node is looked at
-   !> with every edge.
-   real(wp) function touch_time(scene, x, direction)
+   !> The first time at which a node of a contact pair that acts passes through an edge of the
+   !> other surface from outside, or the layer in front of it; huge if that never happens. Every
+   !> node is looked at with every edge.
+   real(wp) function touch_time(scene, i_step, x, direction)
       type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! of the deck
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) where nodes are [L]
       real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node) how they move per time [L]
       integer, allocatable :: slave(:, :), master(:, :), node(:)
@@ -28,6 +29,7 @@ contains
       touch_time = huge(touch_time)
       do i = 1, size(scene%pair)
          if (scene%pair(i)%formulation == formulation_user) cycle   ! it sees all gaps itself
+         if (.not. pair_acts(scene%pair(i), i_step)) cycle
          associate (pair => scene%pair(i))
             call surface_facets(scene, scene%surface(pair%slave), slave)
             call surface_facets(scene, scene%surface(pair%master), master)

@@ -9,7 +9,7 @@ module emcon_first_touch_space
    use emcon_facet_split, only : facet_split_init, facet_split_place, facet_split_t
    use emcon_facets, only : facets_init, facets_t
    use emcon_first_touch_wall_space, only : wall_touch_time
-   use emcon_interactions, only : formulation_user
+   use emcon_interactions, only : formulation_user, pair_acts
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
@@ -36,10 +36,11 @@ module emcon_first_touch_space
 
 contains
 
-   !> The first time at which a node of a contact pair passes through a facet of the other surface
-   !> from outside, or the layer in front of it; huge if that never happens.
-   real(wp) function touch_time(scene, x, direction)
+   !> The first time at which a node of a contact pair that acts passes through a facet of the
+   !> other surface from outside, or the layer in front of it; huge if that never happens.
+   real(wp) function touch_time(scene, i_step, x, direction)
       type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! of the deck
       real(wp), intent(in) :: x(:, :)            !! (3, n_node) where nodes are [L]
       real(wp), intent(in) :: direction(:, :)    !! (3, n_node) how they move per time [L]
       type(side_t) :: slave, master
@@ -49,6 +50,7 @@ contains
       touch_time = huge(touch_time)
       do i = 1, size(scene%pair)
          if (scene%pair(i)%formulation == formulation_user) cycle   ! it sees all gaps itself
+         if (.not. pair_acts(scene%pair(i), i_step)) cycle
          associate (offset => scene%pair(i)%interaction%offset, &
                other => scene%surface(scene%pair(i)%master))
             if (allocated(other%wall)) then

@@ -131,14 +131,16 @@ contains
       end do
    end subroutine find_bodies
 
-   !> Does a contact pair bring pieces `p` and `q` together?
-   pure logical function outline_meets(self, p, q) result(meets)
+   !> Does a contact pair that acts bring pieces `p` and `q` together?
+   pure logical function outline_meets(self, p, q, acts) result(meets)
       type(outline_t), intent(in) :: self
       integer, intent(in) :: p, q                !! 1..n_piece
+      logical, intent(in) :: acts(:)             !! (n_pair)
       integer :: k
 
       meets = .true.
       do k = 1, size(self%pair, 2)
+         if (.not. acts(k)) cycle
          associate (slave => self%on(self%pair(1, k))%piece, &
                master => self%on(self%pair(2, k))%piece)
             if (find_sorted(slave, p) > 0 .and. find_sorted(master, q) > 0) return

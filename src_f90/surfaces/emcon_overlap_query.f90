@@ -35,6 +35,7 @@ module emcon_overlap_query
       !> What goes through within a step is found by `pass`, not by looks at equal parts of it.
       logical :: finds_passages = .false.
       logical :: has_walls = .false.             !! surfaces without facets are looked at too
+      logical, allocatable :: acts(:)            !! (n_pair) of the scene, in the present step
    contains
       procedure(begin_interface), deferred :: begin
       procedure(longest_interface), deferred :: longest
@@ -42,6 +43,8 @@ module emcon_overlap_query
       procedure(overlap_interface), deferred :: overlap
       procedure :: pass
       procedure :: behind_walls
+      procedure :: take_pairs
+      procedure :: has_idle
    end type overlap_query_t
 
    abstract interface
@@ -105,6 +108,21 @@ contains
       associate (unused_self => self, unused_x => x, unused_u => u, unused_overlap => overlap)
       end associate
    end subroutine behind_walls
+
+   !> A step begins in which some pairs act.
+   pure subroutine take_pairs(self, acts)
+      class(overlap_query_t), intent(inout) :: self
+      logical, intent(in) :: acts(:)             !! (n_pair) of the scene
+
+      self%acts = acts
+   end subroutine take_pairs
+
+   !> Is there a pair that does not act?
+   pure logical function has_idle(self)
+      class(overlap_query_t), intent(in) :: self
+
+      has_idle = .not. all(self%acts)
+   end function has_idle
 
    !> Does the overlap stand on `node`?
    elemental logical function overlap_names(self, node)

@@ -136,7 +136,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
 
-      call overlap_walls_find(self%wall, x, u, overlap)
+      call overlap_walls_find(self%wall, self%acts, x, u, overlap)
    end subroutine overlap_query_walls
 
    !> The passages of two pieces through each other that may be too deep.

@@ -20,6 +20,7 @@ module emcon_overlap_walls_space
    !> A wall and what may not be behind it.
    type :: overlap_walls_t
       type(wall_t) :: wall
+      integer :: of_pair = 0                     !! of the scene
       integer, allocatable :: node(:)            !! of the scene, ascending
       real(wp), allocatable :: length(:)         !! (n_node) of the facets at each, the longest [L]
    end type overlap_walls_t
@@ -40,6 +41,7 @@ contains
          allocate(self(size(of)))
          do k = 1, size(of)
             associate (pair => scene%pair(of(k)))
+               self(k)%of_pair = of(k)
                self(k)%wall = scene%surface(pair%master)%wall
                call find_nodes(outline, piece, outline%on(pair%slave)%piece, self(k))
             end associate
@@ -73,14 +75,16 @@ contains
    end subroutine find_nodes
 
    !> The deepest node at x + u, if it is deeper than what was found.
-   pure subroutine overlap_walls_find(self, x, u, overlap)
+   pure subroutine overlap_walls_find(self, acts, x, u, overlap)
       type(overlap_walls_t), intent(in) :: self(:)           !! set up
+      logical, intent(in) :: acts(:)             !! (n_pair) others are not looked at
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
       type(wall_spot_t) :: spot
       integer :: i, k
 
       do k = 1, size(self)
+         if (.not. acts(self(k)%of_pair)) cycle
          associate (wall => self(k)%wall, at => wall_at(self(k)%wall, x, u))
             do i = 1, size(self(k)%node)
                associate (node => self(k)%node(i), length => self(k)%length(i))

@@ -259,7 +259,7 @@ FORMS = [
     ("abaqus", "** CONTROLS", "*Contact Controls, master=m_Surf-1, slave=s_Surf-1, stabilize=1.\n** CONTROLS", 0,
      "the value of STABILIZE has no effect"),
     ("abaqus", "*Output, field, variable=PRESELECT", "*Output, field, time points=T", 2, "unknown time points 'T'"),
-    ("abaqus", "** INTERACTIONS", "*Contact Initialization Data, name=C\n** INTERACTIONS", 2, "use ADJUST of *CONTACT PAIR"),
+    ("abaqus", "** INTERACTIONS", "*Contact Initialization Data, name=C\n** INTERACTIONS", 2, "or ADJUST of *CONTACT PAIR"),
 ]
 
 

@@ -310,6 +310,7 @@ def everything() -> Model:
                       restitution=0.5, damping=(0.0, 0.1, 0.5), tangent_fraction=0.5)
     model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO", edges="YES",
                        initiation="PERSISTENT")
+    model.clearance("S1", "S2", 0.01)
     model.contact(interaction="I", type="NODE TO SURFACE").contact("S1", ("S1", "S2"), type="MORTAR")
     model.tie("T", "S1", "S2", position_tolerance=0.1, multiplier="DUAL")
     model.tie("CELL", "S1", "S2", translation=(1.0, 0.0), reference=1)
@@ -331,6 +332,7 @@ def everything() -> Model:
     step.contact_initiation("PERSISTENT", gap_tolerance=0.1)
     step.contact_interference(amplitude="AMP")
     step.contact_controls(stabilize=True).contact_controls(stabilize=False)
+    step.model_change(("S1", "S2"), add=False).model_change(("S1", "S2"), add=True)
     step.change_friction("I", 0.5).change_friction("I", "rough").change_friction("I")
     step.mortar(integration="SEGMENTS", points=3, multiplier="DUAL", normal="EDGE",
                 feature_angle=40.0)

@@ -43,7 +43,7 @@ contains
          scene%pair(1)%interaction%offset = offset
          way(1, :10) = rate(1 + mod(k - 1, size(rate)))*scene%x(1, :10)
          way(2, :10) = 1.0_wp
-         call check_near(error, touch_time(scene, scene%x, way), gap - offset, tol, gap, &
+         call check_near(error, touch_time(scene, 1, scene%x, way), gap - offset, tol, gap, &
             "case " // to_text(k))
       end do
    end subroutine test_stretch
@@ -61,13 +61,13 @@ contains
       scene%x(2, 11:) = scene%x(2, 11:) + slope*(scene%x(1, 11:) - scene%x(1, 11))
       way(1, 11:) = 0.5_wp
       way(2, 11:) = -speed
-      call check_near(error, touch_time(scene, scene%x, way), gap/speed, tol, gap, "its corner")
-      call check_true(error, touch_time(scene, scene%x, -way) >= huge(gap), "it leaves")
+      call check_near(error, touch_time(scene, 1, scene%x, way), gap/speed, tol, gap, "its corner")
+      call check_true(error, touch_time(scene, 1, scene%x, -way) >= huge(gap), "it leaves")
       scene%x(1, 11:) = scene%x(1, 11:) - 4.0_wp
-      call check_true(error, touch_time(scene, scene%x, way) >= huge(gap), "it passes by")
+      call check_true(error, touch_time(scene, 1, scene%x, way) >= huge(gap), "it passes by")
       ! Its side, which leans by the slope, comes down onto the end of the ground.
       scene%x(1, 11:) = scene%x(1, 11:) + 2.0_wp
-      call check_near(error, touch_time(scene, scene%x, way), fall(), tol, gap, "the ground's end")
+      call check_near(error, touch_time(scene, 1, scene%x, way), fall(), tol, gap, "the ground's end")
 
    contains
 
@@ -109,7 +109,7 @@ contains
          do i = 1, 2
             call look(6, 10, [10 + i, 11 + i])
          end do
-         found = touch_time(scene, x, way)
+         found = touch_time(scene, 1, x, way)
          if (first < longest) then
             n_touch = n_touch + 1
             call check_near(error, found, first, 1.0e3_wp*tol, longest, "case " // to_text(case))

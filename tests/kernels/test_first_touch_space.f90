@@ -75,7 +75,7 @@ contains
             way(1, :n_below) = rate(1 + mod(k - 1, size(rate)))*scene%x(1, :n_below)
             way(2, :n_below) = -0.25_wp*way(1, :n_below) + 0.1_wp
             way(3, :n_below) = 1.0_wp
-            call check_near(error, touch_time(scene, scene%x, way), gap - offset, tol, gap, &
+            call check_near(error, touch_time(scene, 1, scene%x, way), gap - offset, tol, gap, &
                name(i) // ", case " // to_text(k))
          end do
       end do
@@ -96,10 +96,10 @@ contains
          - sum(scene%x(:2, n)))
       way(1, n:) = 0.1_wp
       way(3, n:) = -speed
-      call check_near(error, touch_time(scene, scene%x, way), gap/speed, tol, gap, "its corner")
-      call check_true(error, touch_time(scene, scene%x, -way) >= huge(gap), "it leaves")
+      call check_near(error, touch_time(scene, 1, scene%x, way), gap/speed, tol, gap, "its corner")
+      call check_true(error, touch_time(scene, 1, scene%x, -way) >= huge(gap), "it leaves")
       scene%x(1, n:) = scene%x(1, n:) - 4.0_wp
-      call check_true(error, touch_time(scene, scene%x, way) >= huge(gap), "it passes by")
+      call check_true(error, touch_time(scene, 1, scene%x, way) >= huge(gap), "it passes by")
    end subroutine test_aslant
 
    !> So far that the first spans of time see nothing, as of a body that drops from high above.
@@ -113,7 +113,7 @@ contains
       allocate(way, source=0.0_wp*scene%x)
       scene%x(:, n_below + 1:) = scene%x(:, n_below + 1:) + spread([0.0_wp, far, far], 2, n_below)
       way(2:, n_below + 1:) = -speed
-      call check_near(error, touch_time(scene, scene%x, way), (far + gap)/speed, tol, far/speed, &
+      call check_near(error, touch_time(scene, 1, scene%x, way), (far + gap)/speed, tol, far/speed, &
          "in the end")
    end subroutine test_far
 
@@ -148,7 +148,7 @@ contains
                call look(facets%facet(:4, f), merge(0, n_below, side == 2))
             end do
          end do
-         found = touch_time(scene, x, way)
+         found = touch_time(scene, 1, x, way)
          if (first < longest) then
             n_touch = n_touch + 1
             call check_near(error, found, first, 1.0e3_wp*tol, longest, "case " // to_text(case))

@@ -59,6 +59,7 @@ contains
       type(block_t) :: block(3)
       type(outline_t) :: outline
       type(outline_links_t) :: links
+      logical, allocatable :: acts(:)
       integer :: p, i
 
       call make_three(scene, block)
@@ -83,10 +84,13 @@ contains
       call check_true(error, all(links%place == outline%facet), "places")
       call check_true(error, all(links%host == 0) .and. .not. any(links%is_buried) .and. &
          .not. any(links%is_profile), "no ties, no profiles")
-      call check_true(error, outline_meets(outline, 1, 2) .and. outline_meets(outline, 2, 1) &
-         .and. outline_meets(outline, 2, 2), "pairs")
-      call check_true(error, .not. (outline_meets(outline, 1, 1) .or. outline_meets(outline, 1, &
-         3) .or. outline_meets(outline, 3, 3)), "no others")
+      acts = spread(.true., 1, size(outline%pair, 2))
+      call check_true(error, outline_meets(outline, 1, 2, acts) .and. outline_meets(outline, 2, &
+         1, acts) .and. outline_meets(outline, 2, 2, acts), "pairs")
+      call check_true(error, .not. (outline_meets(outline, 1, 1, acts) .or. outline_meets(outline, &
+         1, 3, acts) .or. outline_meets(outline, 3, 3, acts)), "no others")
+      call check_true(error, .not. any([(outline_meets(outline, 1, p, .not. acts), p = 1, 3)]), &
+         "none where no pair acts")
       call check_true(error, outline%body(1) /= outline%body(2) .and. outline%body(2) &
          /= outline%body(3), "bodies")
    end subroutine test_pieces
@@ -181,7 +185,8 @@ contains
       call add_block(scene, "CPE4", [1, 1], [5.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], block)
       call outline_init(outline, links, scene)
       call check_equal(error, [outline%n_piece, size(outline%facet, 2)], [2, 10], "two can")
-      call check_true(error, .not. outline_meets(outline, 1, 2), "though no pair brings them")
+      call check_true(error, .not. outline_meets(outline, 1, 2, [logical ::]), &
+         "though no pair brings them")
    end subroutine test_single
 
    !> Smoothed edges of the inside of a quarter of a ring lie behind by s (1 - s) L^2/(2 R), but for

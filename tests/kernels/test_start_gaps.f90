@@ -110,7 +110,7 @@ contains
          if (allocated(error)) return
          call start%measure(scene)
          i = findloc(start%node, 10, 1)
-         call start%offset(i, scene, offset, is_last)
+         call start%offset(i, scene, 0.0_wp, offset, is_last)
          call check_near(error, offset, [0.0_wp, gap(k)], tol, 1.0_wp, "offset")
          call check_true(error, is_last .eqv. k > 2, "round-off")
       end do

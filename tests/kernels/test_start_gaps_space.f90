@@ -137,11 +137,11 @@ contains
          call start%measure(scene)
          do i = 1, start%n
             if (start%facet(i) == 0) cycle
-            call start%offset(i, scene, offset, is_last)
+            call start%offset(i, scene, 0.0_wp, offset, is_last)
             call check_near(error, offset, [0.0_wp, 0.0_wp, -0.125_wp - pad], tol, 1.0_wp, "way")
             call check_true(error, .not. is_last, "not yet")
             scene%x(:, start%node(i)) = scene%x(:, start%node(i)) - offset
-            call start%offset(i, scene, offset, is_last)
+            call start%offset(i, scene, 0.0_wp, offset, is_last)
             call check_true(error, is_last, "there")
          end do
          call start%measure(scene)
