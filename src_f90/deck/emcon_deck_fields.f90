@@ -11,9 +11,6 @@ module emcon_deck_fields
    public :: data_t, data_open, next_line, data_error, data_warning
    public :: check_count, is_blank, is_label, get_integer, get_real, get_name
 
-   !> Numbers are multiplied with each other: beyond, a square is none.
-   real(wp), parameter :: largest = sqrt(huge(1.0_wp))
-
    !> A data line taken apart, and the way to the next. `ok` is false once a field was refused.
    type, extends(fields_t) :: data_t
       type(card_t) :: card
@@ -158,7 +155,7 @@ contains
       end associate
    end subroutine get_integer
 
-   !> Read field `k` as a finite real with a finite square; an empty field leaves `value` as it is.
+   !> Read field `k` as a finite real; an empty field leaves `value` as it is.
    subroutine get_real(reader, data, k, what, value)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
@@ -172,11 +169,10 @@ contains
       if (is_blank(data, k)) return
       associate (word => data%text(data%from(k):data%to(k)))
          call read_real(word, number, ok)
-         if (ok .and. abs(number) <= largest) then
+         if (ok) then
             value = number
          else
             call real_fault(word, fault)
-            if (ok) fault = " is too large: its square overflows; choose other units"
             call data_error(reader, data, "the " // what // " " // quoted(word) // fault)
          end if
       end associate
