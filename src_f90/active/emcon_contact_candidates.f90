@@ -89,38 +89,56 @@ contains
       if (self%friction%is_on) self%friction%law%status = slip_status_t()
       self%is_active = self%candidates%takes_part
       call active_set_select(self, system, motion, self%candidates%is_measured)
-      call exclude_bound(self, system, motion)
+      call exclude_bound(self, system, motion, .false.)
       call phase_leave(system%phases, left)
    end subroutine candidates_select
 
    !> Contacts in which nothing is free to move are no candidates: no force closes them. As
    !> sets are solved rows of nothing show as such: only others are looked at.
-   subroutine exclude_bound(self, system, motion, is_known)
+   subroutine exclude_bound(self, system, motion, tries_sets)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      logical, intent(in), optional :: is_known(:)   !! (n_constraint) as sets are: they are none
-      logical :: may_be(self%set%n)
+      logical, intent(in) :: tries_sets          !! else all candidates are solved for together
+      logical :: may_be, has_changed
       integer :: k, pair, i
 
       may_be = .false.
       do k = self%set%n_permanent + 1, self%set%n
-         call constraint_index(system, self%set%id(k), pair, i)
-         may_be(k) = numbering_holds(system%space%numbering, system%contact(pair)%contact%node(i))
-         if (present(is_known)) may_be(k) = may_be(k) .and. .not. is_known(self%set%id(k)) &
-            .and. system%contact(pair)%contact%least_free() > 0.0_wp
+         may_be = may_be .or. may_be_bound(self, system, self%set%id(k), tries_sets)
       end do
-      if (.not. any(may_be)) return
+      if (.not. may_be) return
       call constraints_evaluate(self%set, system, motion, .true.)
       call constraints_rows(self%set, system%space%numbering)
+      has_changed = .false.
       do k = self%set%n_permanent + 1, self%set%n
-         if (.not. may_be(k)) cycle
-         call constraint_index(system, self%set%id(k), pair, i)
-         may_be(k) = is_bound(self%set, k, system%contact(pair)%contact%least_free())
-         if (may_be(k)) call exclude(self, self%set%id(k))
+         associate (id => self%set%id(k))
+            if (.not. may_be_bound(self, system, id, tries_sets)) cycle
+            call constraint_index(system, id, pair, i)
+            if (.not. is_bound(self%set, k, system%contact(pair)%contact%least_free())) cycle
+            call exclude(self, id)
+            has_changed = .true.
+         end associate
       end do
-      if (any(may_be)) call active_set_select(self, system, motion, self%candidates%is_measured)
+      if (has_changed) call active_set_select(self, system, motion, self%candidates%is_measured)
    end subroutine exclude_bound
+
+   !> Is it to be found out whether contact `id` is one in which nothing is free to move? As sets
+   !> are tried what acted so far is none.
+   pure logical function may_be_bound(self, system, id, tries_sets) result(may_be)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: id
+      logical, intent(in) :: tries_sets
+      integer :: pair, i
+
+      call constraint_index(system, id, pair, i)
+      associate (contact => system%contact(pair)%contact)
+         may_be = numbering_holds(system%space%numbering, contact%node(i))
+         if (tries_sets .and. may_be) may_be = contact%least_free() > 0.0_wp .and. .not. &
+            (self%start%was_active(id) .or. self%candidates%acted(id))
+      end associate
+   end function may_be_bound
 
    !> Solve with what acts.
    subroutine candidates_solve(self, system, newton, motion, status, error)
@@ -134,7 +152,7 @@ contains
 
       call phase_enter(system%phases, phase_gaps, left)
       call active_set_select(self, system, motion, self%candidates%is_measured)
-      call exclude_bound(self, system, motion, self%start%was_active .or. self%candidates%acted)
+      call exclude_bound(self, system, motion, .true.)
       self%candidates%acts = .false.
       do k = 1, self%set%n
          self%candidates%acts(self%set%id(k)) = .true.

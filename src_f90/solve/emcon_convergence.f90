@@ -112,9 +112,9 @@ contains
       end associate
    end function convergence_nears_end
 
-   !> How much of the residual the next correction may leave, by a tangent: a part of what the square
-   !> of the last gain will leave of it anyway, and of round-off (Eisenstat and Walker, SIAM J. Sci.
-   !> Comput. 17, 1996).
+   !> How much of the residual the next correction may leave, by a tangent: a part of what the
+   !> square of the last gain will leave of it anyway, and of round-off (Eisenstat and Walker, SIAM
+   !> J. Sci. Comput. 17, 1996).
    pure real(wp) function convergence_accuracy(self) result(left)
       type(convergence_t), intent(in) :: self
 

@@ -69,7 +69,8 @@ module emcon_kept_factor
       integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
       type(factor_rows_t), private :: rows           !! the constraints last taken
-      type(dense_lu_t), private :: lu                !! W^T V of these, where forces have own rows
+      !> W^T V of these, where forces have rows of their own
+      type(dense_lu_t), allocatable, private :: lu
       !> Where the factor is incomplete:
       type(projected_gradients_t), allocatable, private :: gradients
       ! Of contacts that give way: W^T W, and what is added to its diagonal
@@ -219,6 +220,7 @@ contains
       call reach_rows(self, set, is_aside, condensed_accuracy, error)
       if (allocated(error)) return
       if (is_aside) then
+         if (.not. allocated(self%lu)) allocate(self%lu)
          associate (n => set%n_row)
             call dense_lu(transpose(self%rows%l(n + 1:, :n)), self%lu, is_fit)
          end associate
