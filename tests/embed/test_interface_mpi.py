@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -22,9 +23,11 @@ pytestmark = [pytest.mark.skipif(shutil.which("mpirun") is None, reason="there i
 def by(n_process: int, kind: str) -> list[str]:
     """What the host prints with so many processes, of one thread each."""
     root = ["--allow-run-as-root"] if os.geteuid() == 0 else []
-    done = subprocess.run(["mpirun", *root, "--oversubscribe", "-n", str(n_process), sys.executable, HERE/"interface_mpi.py",
-                           kind, str(FRICTION), str(N_STEP)], capture_output=True, text=True, timeout=300,
-                          env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+    # Two that begin at once would both make the folder of their sessions.
+    with tempfile.TemporaryDirectory() as own:
+        done = subprocess.run(["mpirun", *root, "--oversubscribe", "-n", str(n_process), sys.executable,
+                               HERE/"interface_mpi.py", kind, str(FRICTION), str(N_STEP)], capture_output=True, text=True,
+                              timeout=300, env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "TMPDIR": own})
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout.split()
 
