@@ -204,8 +204,8 @@ contains
       integer, intent(in) :: k                   !! 1 to n
       real(wp), intent(in) :: least              !! 0 to 1
 
-      associate (own => set%item(k), first => set%force_rows%row_start(k), &
-            last => set%force_rows%row_start(k + 1) - 1)
+      associate (own => set%item(k), first => set%force_rows%row_start(k) + 1, &
+            last => set%force_rows%row_start(k + 1))
          is_bound = last < first
          if (least > 0.0_wp) is_bound = is_bound .or. norm2(set%force_rows%value(first:last)) &
             <= least*norm2(own%g(:, :own%n_node))
