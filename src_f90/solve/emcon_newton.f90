@@ -579,16 +579,23 @@ contains
       call pick_unknowns(system%space%numbering, self%left, self%residual)
    end subroutine newton_pick_residual
 
-   !> What multipliers under way lack is measured as the residual is.
+   !> What multipliers under way lack is measured as the residual is: where nothing else acts yet
+   !> by its own forces.
    subroutine measure_lack(self, system, set, norm, is_rounding)
       type(newton_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
+      type(system_t), intent(inout) :: system    !! it has responded
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(inout) :: norm
       logical, intent(inout) :: is_rounding
 
       call vector_zero(size(self%left), self%left)
-      call constraints_add_row_forces(set, set%penalty%lack, self%left)
+      if (system%response%with_sizes) then
+         call constraints_add_row_forces(set, set%penalty%lack, self%left, &
+            system%response%magnitude)
+         call take_sizes(self, system)
+      else
+         call constraints_add_row_forces(set, set%penalty%lack, self%left)
+      end if
       call pick_unknowns(system%space%numbering, self%left, self%scale)
       norm = max(norm, relative_size(self%scale, self%forces))
       is_rounding = is_rounding .and. relative_size(self%scale, self%rounding) <= round_off

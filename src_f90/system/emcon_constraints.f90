@@ -343,15 +343,17 @@ contains
       end do
    end subroutine constraints_add_law_forces
 
-   !> Add the forces that rows of gaps have by multipliers `lam`.
-   pure subroutine constraints_add_row_forces(self, lam, force)
+   !> Add the forces that rows of gaps have by multipliers `lam`, and what those are made of.
+   pure subroutine constraints_add_row_forces(self, lam, force, magnitude)
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(in) :: lam(:)             !! (n) [M L/T^2]
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
+      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
       integer :: k
 
       do k = 1, self%n
-         call add_force(self%item(k), lam(k), condition_friction(self%item(k), lam(k)), force)
+         call add_force(self%item(k), lam(k), condition_friction(self%item(k), lam(k)), force, &
+            magnitude)
       end do
    end subroutine constraints_add_row_forces
 

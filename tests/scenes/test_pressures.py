@@ -184,6 +184,19 @@ def test_a_hard_pair_beside_it_gives_way_by_a_penalty_if_asked(tmp_path):
     assert run.verdict["verdict"] == "good"
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("behaviour", list(BEHAVIOURS)[1:])
+def test_a_block_at_rest_is_pushed_away(behaviour, formulation, tmp_path):
+    """Nothing but the pressure before contact acts: what the curve has stored becomes motion."""
+    stored = {"EXPONENTIAL": 0.5*0.005/math.log(100)*(1 - 1e-6), "TABULAR": 0.5*1.0*0.01}[behaviour.split("\n")[0]]
+    run = run_deck(deck(behaviour, formulation, dynamic(0.005, 0.6), young=1e6), tmp_path)
+    assert run.verdict["verdict"] == "good"
+    assert run.history["total"][0] == pytest.approx(stored, rel=1e-9)
+    assert run.history["active"][-1] == 0
+    # The block takes up to a few times pressure by Young's modulus of it.
+    assert run.history["py"][-1] == pytest.approx(math.sqrt(2*stored), rel=1e-4)
+
+
 def test_a_run_goes_on_from_its_middle(tmp_path):
     """What contact has stored is in the restart file: the same bits."""
     text = deck("EXPONENTIAL\n.005, .5", "NODE TO SURFACE", dynamic(0.002, 0.02), start=FALLS).text()
