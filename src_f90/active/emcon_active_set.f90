@@ -2,7 +2,7 @@
 !> Which they are in the end: emcon_contact_rounds.
 module emcon_active_set
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_select
-   use emcon_contact, only : gap_state_t
+   use emcon_contact, only : gap_ratio, gap_state_t
    use emcon_contact_support, only : contact_support_complete, contact_support_forget, &
       contact_support_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
@@ -18,7 +18,7 @@ module emcon_active_set
    use emcon_penalty, only : penalty_forget, penalty_owes, penalty_select, penalty_state_t
    use emcon_scene, only : scene_t
    use emcon_state, only : contact_state_t, state_t
-   use emcon_steps, only : step_is_dynamic, step_t
+   use emcon_steps, only : most_stand_off, step_is_dynamic, step_t
    use emcon_system, only : system_t
    implicit none
    private
@@ -327,7 +327,8 @@ contains
             end if
             call active_set_update_gaps(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%start%was_active(first:last) &
-               .and. contact%state%is_near .and. (contact%state%is_over &
+               .and. contact%state%is_near .and. ((contact%state%is_over &
+               .and. stands_at(contact%state, self%rules%gap_tolerance)) &
                .or. penalty_owes(self%penalty, first, last))
             if (.not. (contact%may_leave .and. any(self%is_active(first:last)))) cycle
             call pair_measure(system, pair, motion%x, motion%u0, motion%du)
@@ -336,6 +337,17 @@ contains
          end associate
       end do
    end subroutine begin_contact
+
+   !> Is the surface that is near now the one that it has touched? Not if it is farther off than any
+   !> contact begins.
+   elemental logical function stands_at(gap, tolerance)
+      type(gap_state_t), intent(in) :: gap
+      real(wp), intent(in) :: tolerance          !! largest new stand-off per edge; 0: any
+
+      stands_at = .not. tolerance > 0.0_wp
+      if (.not. stands_at) stands_at = gap_ratio(gap, gap%gap0 - max(0.0_wp, gap%closed)) &
+         <= max(tolerance, most_stand_off)
+   end function stands_at
 
    !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
    subroutine active_set_select(self, system, motion, is_measured)

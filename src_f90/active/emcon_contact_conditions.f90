@@ -41,7 +41,8 @@ contains
       associate (gap => contact%state(i))
          if (.not. contact%covers(i, motion%x, motion%u0, motion%du)) status = step_too_far
          ! A new contact may not be held at a larger distance than the deck allows.
-         is_new = self%set%is_kept(k) .and. .not. self%start%was_active(self%set%id(k))
+         is_new = self%set%is_kept(k) .and. .not. self%start%was_active(self%set%id(k)) &
+            .and. self%rules%may_cut
          if (is_new .and. self%rules%gap_tolerance > 0.0_wp &
             .and. gap_ratio(gap, gap%gap0) > self%rules%gap_tolerance) status = step_stands_off
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
