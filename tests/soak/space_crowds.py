@@ -29,6 +29,8 @@ from wall_space_scenes import REFERENCE, plane, sphere, wall  # noqa: E402
 
 KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
 GRAVITY = 2.0
+#: Of edges, across which forces act at most by default, where no increment had to be taken as it is.
+GAP_TOLERANCE = 0.5
 #: Of the forces in statics, which Newton's method leaves.
 STATIC_BALANCE = 1.0e-7
 #: Of the largest force, by which Coulomb's law may be missed at a contact: what a solve leaves of its smallest ones.
@@ -242,6 +244,8 @@ def judge(run, deck):
         found.append(f"overlap {deepest.by_edge:.3g}, told {run.verdict['penetration']:.3g}")
     if "*STATIC" in deck:
         return found + judge_rest(fields, deck)
+    if history["stand_off"].max() > GAP_TOLERANCE:
+        found.append(f"forces across {history['stand_off'].max():.2g} of an edge")
     stored = history["kinetic"] + history["strain"] - history["external_work"] + history["friction_loss"]
     stored = stored + history["restitution_loss"]    # what would change the shape of rigid bodies that stop
     if "*FRICTION" in deck:

@@ -123,3 +123,12 @@ def test_a_crowd_in_space_that_rubs(tmp_path):
     deck.write_text(text)
     run = run_deck(deck, tmp_path)
     assert run.verdict["verdict"] == "good" and judge_crowd(run, text) == []
+
+
+def test_a_crowd_whose_nodes_slide_off_corners(tmp_path):
+    """Behind the corner that they leave there is another body, farther off than contact begins: nothing pushes it."""
+    text = scene(11, mortar=True)
+    deck = tmp_path / "scene.inp"
+    deck.write_text(text)
+    run = run_deck(deck, tmp_path)
+    assert run.verdict["verdict"] == "good" and judge_crowd(run, text) == []
