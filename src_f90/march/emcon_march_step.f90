@@ -60,6 +60,8 @@ contains
       self%layer%needs_mass = .false.
       call step_check_begin(self%step_check)
       self%active%rules%may_cut = part%may_cut
+      self%active%rules%gap_tolerance &
+         = scene%step(self%state%clock%i_step)%contact%gap_tolerance
       self%active%start%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
       call solve(self, scene, part, increment, status, error)
