@@ -7,7 +7,8 @@ module emcon_patch_near_space
    use emcon_patch_sides_space, only : frame_normal, frame_sides, patch_sides_t, sides_place
    use emcon_rotation, only : cross_product
    use emcon_sort, only : find_sorted
-   use emcon_touch_rule_space, only : touch_rule_space_is_beyond, touch_rule_space_is_through
+   use emcon_touch_rule_space, only : touch_rule_space_depth, touch_rule_space_is_beyond, &
+      touch_rule_space_is_through
    implicit none
    private
    public :: patch_scope_t, patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
@@ -73,6 +74,7 @@ contains
       type(patch_scope_t), intent(in) :: scope   !! the facets
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(nearest_t) :: nearest
+      logical, allocatable :: is_through(:)      ! what it is on the other side of
       real(wp) :: origin(3), own(3)
       integer :: k, t
 
@@ -86,7 +88,7 @@ contains
       call find_beyond(near, sides, scope%facet)
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
       allocate(near%is_listed(near%n), near%is_apart(near%n), near%is_past(near%n), &
-         near%is_beside(near%n), source=.false.)
+         near%is_beside(near%n), is_through(near%n), source=.false.)
       if (allocated(scope%is_far)) then
          associate (start => sides%triangles%split%start, f => scope%facet)
             near%is_beside = [((scope%is_far(k), t = start(f(k)), start(f(k) + 1) - 1), &
@@ -110,16 +112,48 @@ contains
             associate (f => sides%triangles%split%facet(near%triangle(t)), &
                   way => c(:, 1)*nearest%weight(1) + c(:, 2)*nearest%weight(2) &
                   + c(:, 3)*nearest%weight(3))
-               if (touch_rule_space_is_through(sides%rule, i, f, n, -way, near%gives_way)) &
-                  n = 0.0_wp
-               if (touch_rule_space_is_beyond(sides%rule, i, f, own, way)) n = 0.0_wp
+               is_through(t) = touch_rule_space_is_through(sides%rule, i, f, n, -way, &
+                  near%gives_way) .or. touch_rule_space_is_beyond(sides%rule, i, f, own, way)
             end associate
             nearest = nearest_t()
          end associate
       end do
+      if (any(is_through)) call leave_far_side(near, sides, is_through)
       if (sides%frames%of_triangles) call find_beside(near, patch_outline(sides, i, x, u), &
          origin, scope%beside + narrow_flange*sides%triangles%size(near%triangle))
    end subroutine patch_near_find
+
+   !> Triangles that the point is on the other side of face nothing. What goes on from them without
+   !> a ridge, and is as far in front of it, is the same side of the body: of a thin one the way to
+   !> that is slanted.
+   pure subroutine leave_far_side(near, sides, is_through)
+      type(patch_near_t), intent(inout) :: near  !! with normals
+      type(patch_sides_t), intent(in) :: sides
+      logical, intent(inout) :: is_through(:)    !! (n) in: those below which it is
+      integer :: waiting(near%n), k, n, other, t
+
+      n = count(is_through)
+      waiting(:n) = pack([(t, t = 1, near%n)], is_through)
+      do while (n > 0)
+         t = waiting(n)
+         n = n - 1
+         do k = 1, 3
+            other = near%beyond(k, t)
+            if (other == 0) cycle
+            if (is_through(other) .or. sides%triangles%is_ridge(k, near%triangle(t))) cycle
+            associate (depth => touch_rule_space_depth(sides%rule, near%point, &
+                  sides%triangles%split%facet(near%triangle(other)), near%gives_way))
+               if (dot_product(near%corner(:, 1, other), near%normal(:, other)) <= depth) cycle
+            end associate
+            is_through(other) = .true.
+            n = n + 1
+            waiting(n) = other
+         end do
+      end do
+      do t = 1, near%n
+         if (is_through(t)) near%normal(:, t) = 0.0_wp
+      end do
+   end subroutine leave_far_side
 
    !> Which of the triangles are beyond each side of each.
    pure subroutine find_beyond(near, sides, facet)

@@ -21,6 +21,7 @@ module emcon_overlap_space
       integer :: node = 0                        !! of the scene, it or the nearest on its facet:
       logical :: is_beside = .false.             !! it is not the node itself
       real(wp) :: at(3) = 0.0_wp                 !! [L]
+      integer :: own(2) = 0                      !! points that it is, or between which it is
       type(nearest_t) :: nearest
       real(wp) :: ratio = 0.0_wp                 !! depth per length of the facet; 0: not deeper
    end type place_t
@@ -63,8 +64,8 @@ contains
          k = maxloc(place%ratio, dim=1)
          if (.not. place(k)%ratio > overlap%depth) return
          ! Rounding may have led astray along edges: what is deep is asked again.
-         if (b%is_closed .and. place(k)%ratio > aligned .and. .not. inside%is_own) then
-            if (.not. inside_confirm(inside, b, place(k)%at)) then
+         if (b%is_closed .and. place(k)%ratio > aligned) then
+            if (.not. inside_confirm(inside, b, place(k)%at + before(inside, a, place(k)))) then
                place(k)%ratio = 0.0_wp
                cycle
             end if
@@ -77,6 +78,27 @@ contains
          return
       end do
    end subroutine take_deepest
+
+   !> To a place that is asked in front of an outline, of one on it: what is inside there is inside
+   !> of another part. On another outline places are asked themselves.
+   pure function before(inside, a, place) result(step)
+      type(inside_t), intent(in) :: inside
+      type(triangles_t), intent(in) :: a
+      type(place_t), intent(in) :: place
+      real(wp) :: step(3)                        !! [L]
+      integer :: k, t
+
+      step = 0.0_wp
+      if (.not. inside%is_own) return
+      do t = 1, size(a%split%facet)
+         if (all([(any(a%split%corner(:, t) == place%own(k)), k = 1, 2)])) then
+            associate (normal => normal_of(a, t))
+               step = step + normal/max(sqrt(dot_product(normal, normal)), tiny(1.0_wp))
+            end associate
+         end if
+      end do
+      step = step*(inside%pad/max(sqrt(dot_product(step, step)), tiny(1.0_wp)))
+   end function before
 
    !> All places that are inside by more than `least`, per length of the facet.
    subroutine find_places(inside, a, b, least, place)
@@ -125,7 +147,7 @@ contains
          integer, intent(inout) :: near          !! in: about the nearest triangle; out: it is
          type(place_t) :: new
 
-         new = point
+         new = place_t(point%node, point%is_beside, point%at, own)
          if (inside%is_own) then
             call inside_nearest_own(inside, b, new%at, own, near, new%nearest)
          else

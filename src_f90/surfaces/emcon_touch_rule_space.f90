@@ -15,7 +15,8 @@ module emcon_touch_rule_space
    private
    public :: touch_rule_space_t, touch_rule_space_init, touch_rule_space_sees, &
       touch_rule_space_may, touch_rule_space_meet, touch_rule_space_is_through, &
-      touch_rule_space_is_beyond, touch_rule_space_depths, touch_rule_space_measure
+      touch_rule_space_is_beyond, touch_rule_space_depth, touch_rule_space_depths, &
+      touch_rule_space_measure
 
    !> Classes of bodies at most, and with them constraints of a frame.
    integer, parameter :: most_classes = 4
@@ -195,18 +196,28 @@ contains
       real(wp), intent(in) :: normal(3)          !! of it or a part of it, of length 1, outwards
       real(wp), intent(in) :: way(3)             !! from its nearest place to the node [L]
       logical, intent(in) :: gives_way           !! other bodies may be deep in this one
-      real(wp) :: distance, depth
+      real(wp) :: distance
 
-      is_through = .false.
-      if (is_own(self, i, f)) then
-         depth = self%depth(f)
-      else
-         if (gives_way .or. .not. allocated(self%own_depth)) return
-         depth = self%depth(f) + self%own_depth(i)
-      end if
       distance = sqrt(dot_product(way, way))
-      is_through = distance > through*depth .and. dot_product(way, normal) < under*distance
+      is_through = distance > touch_rule_space_depth(self, i, f, gives_way) .and. &
+         dot_product(way, normal) < under*distance
    end function touch_rule_space_is_through
+
+   !> How far behind facet `f` point `i` is on the other side of a body [L].
+   pure real(wp) function touch_rule_space_depth(self, i, f, gives_way) result(depth)
+      type(touch_rule_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! as in `touch_rule_space_may`
+      integer, intent(in) :: f                   !! 1 to n_facet
+      logical, intent(in) :: gives_way           !! other bodies may be deep in this one
+
+      if (is_own(self, i, f)) then
+         depth = through*self%depth(f)
+      else if (gives_way .or. .not. allocated(self%own_depth)) then
+         depth = huge(depth)
+      else
+         depth = through*(self%depth(f) + self%own_depth(i))
+      end if
+   end function touch_rule_space_depth
 
    !> Is facet `f` of the body that point `i` is of?
    pure logical function is_own(self, i, f)

@@ -17,7 +17,7 @@ import tempfile
 
 from book import (bar, causes, contact_damping, contact_patch, contact_sides, elements, forces, free_bodies,
                   friction, gain, hertz, hertz_ball, hertz_pressed, impacts,
-                  ironing, midside, numerics, plain, press_fit, ring, slave_floor, soft, spin, statics, ties,
+                  ironing, midside, numerics, plain, press_fit, ring, self_contact_space, slave_floor, soft, spin, statics, ties,
                   ties_condition, ties_space, ties_space_orders)
 from book.common import Runs
 
@@ -26,7 +26,7 @@ DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 #: In the order of the book.
 CHAPTERS = [
     chapter
-    for module in (ring, spin, bar, forces, free_bodies, statics, elements, ties, ties_condition, ties_space, ties_space_orders, contact_patch,
+    for module in (ring, spin, bar, forces, free_bodies, self_contact_space, statics, elements, ties, ties_condition, ties_space, ties_space_orders, contact_patch,
                    hertz, hertz_pressed, hertz_ball, press_fit, midside, ironing, friction, contact_damping, plain, contact_sides, slave_floor, soft, numerics, impacts,
                    gain, causes)
     for chapter in module.CHAPTERS

@@ -32,6 +32,7 @@ contains
          test_case_t("a body in the hole of another", test_hole), &
          test_case_t("a surface that is not closed", test_open), &
          test_case_t("a body in itself", test_own), &
+         test_case_t("ends of a body that meet flush", test_own_flush), &
          test_case_t("in other units, bit by bit", test_units)]
    end subroutine collect_overlap_space
 
@@ -285,6 +286,36 @@ contains
          end if
       end do
    end subroutine test_own
+
+   !> A bar bent to a ring whose ends, mirror images, are in each other by little: their sides nearly
+   !> lie in one plane, and what is beyond the other end is not inside of it.
+   subroutine test_own_flush(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: deep = 1.0e-6_wp
+      type(shape_surface_t) :: bar
+      type(triangles_t) :: a
+      type(overlap_t) :: overlap
+      real(wp) :: angle, worst
+      integer :: i, k
+
+      worst = 0.0_wp
+      do k = 1, 20
+         call make_box(bar, [24, 2, 2], [0.0_wp, 2.0_wp, 0.0_wp], [1.0_wp, 3.0_wp, 1.0_wp])
+         do i = 1, size(bar%x, 2)
+            angle = (2.0_wp*acos(-1.0_wp) + deep/2.5_wp)*bar%x(1, i)
+            associate (rise => 0.1_wp*min(bar%x(1, i), 1.0_wp - bar%x(1, i))*[sin( &
+                  5.0_wp*bar%x(2, i) + real(k, wp)), cos(7.0_wp*bar%x(3, i) + real(k, wp))])
+               bar%x(:, i) = [(bar%x(2, i) + rise(1))*sin(angle), (bar%x(2, i) + rise(1)) &
+                  *cos(angle), bar%x(3, i) + rise(2)]
+            end associate
+         end do
+         call take_up(a, bar)
+         overlap = overlap_t()
+         call overlap_space_own(a, overlap)
+         worst = max(worst, overlap%depth*overlap%length)
+      end do
+      call check_true(error, worst < 2.0_wp*deep, "as deep as they are: " // to_text(worst, 4))
+   end subroutine test_own_flush
 
    !> Powers of two change nothing but the length.
    subroutine test_units(error)

@@ -1,13 +1,14 @@
 !> What a surface in space may touch of itself.
 module test_touch_rule_space
-   use check, only : check_equal, check_true, test_case_t
+   use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_facets, only : facets_init, facets_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
-   use emcon_touch_rule_space, only : touch_rule_space_init, touch_rule_space_is_through, &
-      touch_rule_space_may, touch_rule_space_measure, touch_rule_space_sees, touch_rule_space_t
+   use emcon_touch_rule_space, only : touch_rule_space_depth, touch_rule_space_init, &
+      touch_rule_space_is_through, touch_rule_space_may, touch_rule_space_measure, &
+      touch_rule_space_sees, touch_rule_space_t
    use space_scenes, only : add_box, skin, space_begin
    implicit none
    private
@@ -134,6 +135,9 @@ contains
          call touch_rule_space_measure(rule, facets, facets, none, scene)
          call check_true(error, touch_rule_space_is_through(rule, node, 1, down, -1.1_wp*down, &
             .false.), "through both")
+         call check_near(error, [touch_rule_space_depth(rule, node, 1, .false.), &
+            touch_rule_space_depth(rule, 1, 1, .false.)], [1.0_wp, 0.5_wp], 1.0e-15_wp, 1.0_wp, &
+            "halves of two elements, and of one")
          call check_true(error, .not. touch_rule_space_is_through(rule, node, 1, down, &
             -0.9_wp*down, .false.), "one in the other")
          call check_true(error, .not. touch_rule_space_is_through(rule, node, 1, down, &

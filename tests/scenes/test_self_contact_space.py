@@ -33,16 +33,17 @@ def bent(x: np.ndarray) -> np.ndarray:
     return np.stack([straight - out*np.sin(turn), out*np.cos(turn), -x[:, 2]], axis=1)
 
 
-def u_strip(kind: str, contact: str, speed: float = 3.0, until: float = 0.6,
-            cells: tuple[int, int, int] = (16, 2, 2)) -> tuple[str, Block, np.ndarray]:
-    """A free U whose arms fly at each other; the places of its nodes along it."""
-    block = Block(kind, cells, size=(LENGTH, THICK, WIDE))
+def u_strip(kind: str, contact: str, speed: float = 3.0, until: float = 0.6, cells: tuple[int, int, int] = (16, 2, 2),
+            h: float = 0.02, more: str = "", longer: float = 0.0) -> tuple[str, Block, np.ndarray]:
+    """A free U whose arms fly at each other, one longer than the other; the places of its nodes along it."""
+    block = Block(kind, cells, size=(LENGTH + longer, THICK, WIDE))
+    block.x[:, 0] -= longer
     along = block.x[:, 0].copy()
     block.x = bent(block.x)
     v = -speed*np.sign(block.x[:, 1])*np.clip(block.x[:, 0]/ARM, 0.0, 1.0)
     moves = "".join(f"{k}, 2, {w!r}\n" for k, w in enumerate(v.tolist(), 1) if w)
     text = (bodies([block], [faces(block)], RUBBER) + contact + "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + moves
-            + dynamic(0.02, until))
+            + dynamic(h, until, more))
     return text, block, along
 
 
@@ -96,6 +97,28 @@ def test_a_strip_closes_onto_itself(kind: str, contact: str, deepest: float, tmp
     check_books(run)
     assert run.history["active"].max() > 0
     assert arms_in_each_other(run, block, along) <= deepest
+
+
+def by_mortar(pair: str) -> str:
+    return pair.replace("INTERACTION=I\nS1", "INTERACTION=I, TYPE=MORTAR\nS1")
+
+
+def massless_strip(contact: str, initiation: str) -> tuple[str, Block, np.ndarray]:
+    """A U that closes; the tip of its shorter arm is over the longer one."""
+    return u_strip("C3D8", contact, 1.5, 0.5, (26, 3, 3), 0.01, f"*CONTACT INITIATION, TYPE={initiation}\n", 0.35)
+
+
+@pytest.mark.parametrize("contact", [PAIR, by_mortar(PAIR)])
+def test_a_strip_without_mass_at_its_surface(contact: str, tmp_path: Path) -> None:
+    """Both arms are slave and master, and neither has mass: gaps close, nothing gets its mass back, the books hold."""
+    text, block, along = massless_strip(contact, "MASSLESS")
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good", run.log[-600:]
+    assert "contact surfaces without mass: 332 nodes" in run.log and "mass back" not in run.log
+    check_books(run)
+    assert run.history["active"].max() > 4 and run.history["cuts"].sum() == 0
+    assert run.history["stand_off"].max() <= 64*EPSILON
+    assert arms_in_each_other(run, block, along) <= 0.02*THICK
 
 
 def test_without_contact_it_goes_through_itself(tmp_path: Path) -> None:
