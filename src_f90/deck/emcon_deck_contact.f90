@@ -294,11 +294,11 @@ contains
             call need_facets(reader, data, master, "master surface", &
                "; only the slave surface may, and only under NODE TO SURFACE; ")
             if (allocated(slave%wall)) call data_error(reader, data, "surface " // slave%name // &
-               " has a shape and no nodes that could be slaves; " // trim(merge( &
+               " is a wall, which has no nodes that could be slaves; " // trim(merge( &
                "one of the two must have nodes", "swap the two                  ", &
                allocated(master%wall))))
             if (allocated(master%wall) .and. pair%both_sides) call data_error(reader, data, &
-               "surface " // master%name // " has a shape and no nodes; leave out SIDES=BOTH")
+               "surface " // master%name // " is a wall without nodes; leave out SIDES=BOTH")
          end if
       end associate
       if (.not. data%ok) pair%master = 0

@@ -287,12 +287,12 @@ contains
          text = "a contact would act across a gap larger than GAP TOLERANCE"
       case (step_not_held)
          text = "nothing resists a motion: " // self%active%support%text
-         if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
-         if (active_set_slides(self%active)) text = text // ", where friction is at its limit"
+         if (.not. self%active%support%is_pushed) text = text // "; no load does work on it"
+         if (active_set_slides(self%active)) text = text // "; friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
          if (active_set_slides(self%active)) text = text // ", or more *FRICTION"
          if (.not. self%active%support%is_pushed) text = text // &
-            ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+            ", or take the smallest such motion by *CONTACT CONTROLS, STABILIZE"
       case (step_unbalanced)
          text = "nodes without mass have no equilibrium where contacts open or close"
       case (step_overlaps)

@@ -82,7 +82,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: status(2) = [step_cycling, step_too_far]
       character(len=*), parameter :: told(2) = [character(len=53) :: &
-         "does not converge: its result changes from try to try", "slides too far for one increment"]
+         "does not converge: its result changes from try to try", &
+         "slides too far for one increment"]
       type(stepper_t) :: stepper
       character(len=:), allocatable :: text
       integer :: i, k
@@ -164,8 +165,8 @@ contains
                march%active%support%is_pushed = i == 1
                call march_reason(march, stepper%scene, step_not_held, text)
                expected = "nothing resists a motion: body A"
-               if (i == 0) expected = expected // ", on which no load does work; add *BOUNDARY " &
-                  // "conditions, or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+               if (i == 0) expected = expected // "; no load does work on it; add *BOUNDARY " // &
+                  "conditions, or take the smallest such motion by *CONTACT CONTROLS, STABILIZE"
                if (i == 1) expected = expected // "; add *BOUNDARY conditions"
                call check_equal(error, text, expected, "not held")
             end do
