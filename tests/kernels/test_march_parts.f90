@@ -190,9 +190,8 @@ contains
          if (allocated(error)) return
          call march_reason(stepper%march, stepper%scene, step_singular, text)
          expected = "the system is singular"
-         if (k == 2) expected = expected // "; elements of type CPE8R, as 1, have motions " &
-            // "without strain if there is a single one or a single row of them: take two " &
-            // "across, or CPE8"
+         if (k == 2) expected = expected // "; elements of type CPE8R, as 1, have zero-energy " &
+            // "modes if there is a single one or a single row of them: use two rows, or CPE8"
          call check_equal(error, text, expected, "reason")
          call stepper_close(stepper)
          stepper = stepper_t()
