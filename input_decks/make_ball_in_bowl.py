@@ -25,10 +25,10 @@ The bowl is a rigid sphere of radius 2, TYPE=SPHERE with the balls inside, and f
 other, and 0.5 aside, 0.01 above the bowl; gravity 1.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
-What to look at: without friction balls do not roll, and leave on other ways than they came.
+What to look at: without friction balls do not roll, and leave along other paths than they came.
 
 Expected: the total energy constant to 1e-11; the angular momentum about the vertical axis through
-          the centre of the bowl 0, as nothing has a moment about it, to 1e-11.
+          the centre of the bowl 0, as no force has a moment about it, to 1e-11.
 Overlap: 0.0082 of an edge at most, where edges of round surfaces cross between nodes; bad from 0.02 on.
 
 Made by make_ball_in_bowl.py. Change a parameter for one run: --set h=0.01

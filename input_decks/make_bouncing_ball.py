@@ -22,10 +22,10 @@ density 1, held at its two short sides. The ball starts {gap:g} above it with th
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
 What to look at: contact pressure and force on the plate in ParaView; the ball leaves more slowly
-than it came, as the plate swings on.
+than it came, because the plate keeps vibrating.
 
 Expected: total energy constant to 1e-11 of it; of the ball the momenta along the plate change by
-          the slopes of the bent plate only, as nothing rubs.
+          the slopes of the bent plate only, because there is no friction.
 
 Made by make_bouncing_ball.py. Change a parameter for one run: --set h=0.0025
 """

@@ -68,8 +68,8 @@ Units: any consistent set (force F, length L; stress F/L^2, thickness 1 L).
 Without contact the upper block is free to fall, so a first step closes the contact by a small
 prescribed displacement, and the second replaces that by the pressure.
 
-What to look at: contact pressure and stress at the end. MORTAR with SEGMENTS hands the uniform
-pressure on exactly; NODE TO SURFACE does not, however fine the mesh (except where it matches).
+What to look at: contact pressure and stress at the end. MORTAR with SEGMENTS transmits the uniform
+pressure exactly; NODE TO SURFACE does not, however fine the mesh (except where it matches).
 
 Expected at the end, to round-off: contact pressure {PRESSURE:g} at every covered slave node;
           stress yy = {-PRESSURE:g}, xx = {-q + 0.0:.12g}, xy = 0 everywhere; stretches

@@ -25,8 +25,8 @@ Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
 What to look at: how the push runs along the curve, and how the last one brings all others to rest.
 
-Expected: all lie still at the end, kinetic energy below 1e-15 of the largest; friction takes energy
-in each increment; total energy, what friction and impacts took counted, constant to 1e-11.
+Expected: all lie still at the end, kinetic energy below 1e-15 of the largest; friction dissipates energy
+in each increment; total energy plus losses of friction and impacts constant to 1e-11.
 
 Made by make_dominoes.py. Change a parameter for one run: --set t_end=1
 """

@@ -26,10 +26,10 @@ battery, {battery} mm of C3D8, has 1 mm of play to all sides but one; E = 1000 M
 TYPE=PLANE, is rigid; mu = {friction} everywhere. It comes at {speed} mm/s, with a corner first.
 Units: mm, t, s, N, MPa, mJ.
 
-What to look at: the corner yields and throws the casing back, turning; the battery flies on, hits one wall after
-another, and bulges the large ones.
+What to look at: the corner is pressed in, and the casing rebounds, turning; the battery hits one wall after
+another, and bends the large ones outwards.
 
-Expected: energy and what friction takes from it constant in sum to 1e-11; the momentum along the floor changes by
+Expected: energy plus friction losses constant to 1e-11; the momentum along the floor changes by
           at most {friction} of what it does across.
 
 Made by make_dropped_casing.py. Change a parameter for one run: --set h=1e-5

@@ -49,7 +49,7 @@ Expected at the end (Hertz, bodies large against the contact): half-width
           second moment of the force, a^2/4) within 0.4 percent. That is
           per length of the reference mesh, as linear theory has it: per deformed length,
           as the result file has it, the pressure is larger by the strain of 2 percent.
-Overlap: 0.0034 of an edge at most, as gaps held in the mean let single nodes in; bad from 0.02 on.
+Overlap: 0.0034 of an edge at most, because mortar closes gaps in the mean; bad from 0.02 on.
           With NODE TO SURFACE there is none.
 
 Made by make_hertz.py. Change a parameter for one run: --set formulation="NODE TO SURFACE"

@@ -28,10 +28,10 @@ The die is the slave.
 Units: any consistent set (force F, length L; stress F/L^2, thickness 1 L).
 
 What to look at: the reaction of the die while it is drawn, 1 < t < {PATH + 1:g}. Nothing changes
-along the path but the place of the die between the nodes of the block (and the distance to
+along the path but the position of the die between the nodes of the block (and the distance to
 its ends): each ripple is the mesh, one period per element of the block, which is
 {LONG:g}/CELLS long.
-The horizontal reaction has no reason but that.
+The horizontal reaction consists of this ripple only.
 
 EXPECTED
 
@@ -52,7 +52,7 @@ Expected: vertical reaction 7.45e8 at t = 1 and 7.6e8 on the mean over 4 < t < 9
           Roles are swapped by --set slave=BLOCK_TOP --set master=DIE_FACE. With the die as the
           slave NODE TO SURFACE must cut increments, as nodes fall into the dents between
           elements of the block: 16 times with the nodes of both sides held, 20 with SIDES=ONE.
-Overlap: 0.01 of an edge at most, as gaps held in the mean let single nodes in; bad from 0.02 on.
+Overlap: 0.01 of an edge at most, because mortar closes gaps in the mean; bad from 0.02 on.
           With NODE TO SURFACE there is none.
 """
 

@@ -53,6 +53,8 @@ STEP = """
 HIGH, 3, 3, <push>
 *NODE FILE
 U, RF
+*EL FILE
+S
 *CONTACT FILE
 {asked}
 *END STEP

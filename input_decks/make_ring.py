@@ -53,7 +53,7 @@ What to look at: the ring flattens while it slides along the foundation, and reb
 The total energy is held through contact and release, and the rim has no mass of its own, which
 makes contact forces smooth (initiation = AUTO takes MASSLESS here). The nodes
 of one side are enough (sides = ONE): none of the flat top comes into the finer rim, as the verdict
-tells, and px is kept better than with both, which lean on the chords of the rim.
+tells. With the nodes of both sides those of the top push the straight edges of the rim, and px changes more.
 
 Expected: total energy {energy:.6g} throughout; ring mass {mass:.6g};
           ring momentum ({px:.6g}, {py:.6g}) before contact;

@@ -44,7 +44,7 @@ the total energy, px, py and lz (about the origin) stay as they are at the start
 Expected: {momenta_text(momenta(strip, DENSITY, velocity))};
           each constant to 1e-11 relative. First contact at t = 0.19; it comes and goes until
           t = 0.6 to 1.2, which depends on h; the strain energy reaches 0.040 to 0.044.
-Overlap: 0.0057 of an edge at most, as gaps held in the mean let single nodes in; bad from 0.02 on.
+Overlap: 0.0057 of an edge at most, because mortar closes gaps in the mean; bad from 0.02 on.
           With NODE TO SURFACE there is none.
 
 Made by make_self_contact.py. Change a parameter for one run: --set h=0.005

@@ -20,7 +20,7 @@ What to look at: the way that the block slides; friction_loss beside kinetic in 
 contact_status, 2 while a node slides and 1 once it sticks.
 
 Expected: way v^2/(2 mu g) = 0.666667, at rest after v/(mu g) = 0.666667; at the end friction has
-          taken the kinetic energy of the start, 4, but for what damping took of the vibration.
+          dissipated the kinetic energy of the start, 4, except for what damping did with the vibration.
           total + damping_loss + friction_loss is constant.
 
 Made by make_sliding_block.py. Change a parameter for one run: --set mu=0.6

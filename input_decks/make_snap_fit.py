@@ -28,7 +28,7 @@ damped. Its left end is guided along x: by {push} to the right until 3, back by 
 catch is clamped at its foot; no friction.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
-What to look at: the arm bends by {lift} over the catch, swings on it, springs back behind it, and bears
+What to look at: the arm bends by {lift} over the catch, vibrates on it, springs back behind it, and bears
 with all of the rear face of its nose when it is pulled back.
 
 Expected: the force along x that pushes it in, at most {force} by beam theory where it is pushed slowly, and a

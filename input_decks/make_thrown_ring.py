@@ -24,10 +24,10 @@ leaning by 20 degrees and 0.27 beside the axis of a peg of radius 0.35 with a ro
 velocity (0.3, 0, -1), under gravity 1. The peg, TYPE=REVOLUTION, and the floor, TYPE=PLANE, are fixed.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
-What to look at: where the ring meets the top of the peg it swings round, and threads.
+What to look at: where the ring meets the top of the peg it turns over and slides down the peg.
 
 Expected: the total energy constant to 1e-11; the angular momentum about the axis of the peg, too,
-          as nothing has a moment about it.
+          as no force has a moment about it.
 
 Made by make_thrown_ring.py. Change a parameter for one run: --set h=0.01
 """

@@ -47,7 +47,7 @@ Expected: {momenta_text(one + other)};
           In contact from t = 0.12 to 0.85; after that the ring has px = -0.46 and py = 0.34,
           the disc px = 0.34 and py = -0.37, all +- 0.03 over h = 0.01 to 0.0025 and the
           formulations.
-Overlap: 0.017 of an edge at most, as gaps held in the mean let single nodes in; bad from 0.02 on.
+Overlap: 0.017 of an edge at most, because mortar closes gaps in the mean; bad from 0.02 on.
           With NODE TO SURFACE there is none.
 
 Made by make_two_bodies.py. Change a parameter for one run: --set normal=EDGE

@@ -436,7 +436,7 @@ class Model(Source):
         type          NODE TO SURFACE, SEGMENT or MORTAR
         sides         ONE: contact stops nodes of the slave; BOTH: of the master, too, NODE TO SURFACE
                       only; AUTO (default): both for NODE TO SURFACE; else the rounder surface
-                      becomes the slave if the other would push it sideways, without `adjust`
+                      becomes the slave if the other is too coarse for it, without `adjust`
         guard         YES (default): other nodes enter by a twentieth of an edge at most; NO: they
                       may enter
         edges         YES (default): sharp edges that cross are stopped, in three dimensions; NO: not

@@ -54,6 +54,7 @@ class Force:
     has_means: bool = False                                      #: values are means of increments
     is_sampled: bool = False                                     #: at frames, not increments
     is_count: bool = False                                       #: numbers of constraints
+    n_smaller: int = 0                                           #: pairs that are not drawn
     note: str = ""                                               #: empty: nothing meets
 
 
@@ -89,7 +90,8 @@ def read_force(paths: ResultPaths, file: FieldFile | None,
 
 def _force_of_pairs(paths: ResultPaths, history: NDArray[np.void]) -> Force:
     """On the second surface of each pair, along the axis on which most is transmitted; with
-    friction along all."""
+    friction along all. Where these are more curves than colours, a curve per pair is the length of
+    its force, and of more pairs than colours those with the largest forces are drawn."""
     columns = history.dtype.names or ()
     count = sum(re.fullmatch(r"pair\d+_active", name) is not None for name in columns)
     named = read_pairs(paths)
@@ -122,10 +124,24 @@ def _force_of_pairs(paths: ResultPaths, history: NDArray[np.void]) -> Force:
         for along in [axis, *(other for other in axes if rubs and other != axis)]:
             curves[f"{name}, ${along}$" if rubs else name] = \
                 0.0 - history[f"pair{k + 1}_force_{along}"]
+    if len(curves) > len(COLOURS):
+        return _lengths_of_pairs(history, {k: names[k] for k in alone}, axes)
     is_along_one = len(curves) == len(alone)
     return Force(history["time"], curves, "contact force"
                  + (f", ${axis}$ " if is_along_one else " ") + UNITS["force"],
                  has_means=not is_static(history))
+
+
+def _lengths_of_pairs(history: NDArray[np.void], names: dict[int, str], axes: list[str]) -> Force:
+    """Lengths of the forces of pairs, those with the largest first."""
+    length = {k: np.linalg.norm([history[f"pair{k + 1}_force_{axis}"] for axis in axes], axis=0)
+              for k in names}
+    order = sorted(names, key=lambda k: -float(np.nanmax(length[k], initial=0.0)))
+    curves: dict[str, Array] = {}
+    for k in order[:len(COLOURS)]:
+        curves[names[k] if names[k] not in curves else f"{names[k]}, {k + 1}"] = length[k]
+    return Force(history["time"], curves, f"contact force $|F|$ {UNITS['force']}",
+                 has_means=not is_static(history), n_smaller=len(order) - len(curves))
 
 
 def _force_of_frames(file: FieldFile) -> Force:
@@ -302,6 +318,8 @@ def draw_force(axes: Axes, force: Force) -> None:
                           linewidth=2.2, solid_capstyle="butt", alpha=1.0 if is_alone else 0.6,
                           label="mean" if k == 0 and not has_mean else None)
                 has_mean = True
+    if force.n_smaller:
+        axes.plot([], [], linestyle="none", label=f"{force.n_smaller} smaller")
     if force.is_count:
         axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_ylabel(force.label)

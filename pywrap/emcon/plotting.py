@@ -26,7 +26,8 @@ N_TIMES = 6
 #: Sizes on paper [inch].
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 11.0, 0.62, 1.0, 0.30, 0.48
 MARGIN = 0.25                  # at the right, where nothing stands
-SCENE_GAP, PANEL_GAP, ROW_GAP, PANEL_HEIGHT = 0.07, 0.72, 0.98, 1.85
+SCENE_GAP, PANEL_GAP, PANEL_HEIGHT = 0.07, 0.72, 1.85
+ROW_GAP, BARE_ROW_GAP = 0.98, 0.70   # below frames with numbers; below those of space
 LEGEND_TOP = 0.62              # above panels without bodies
 SCENE_HEIGHT = (1.0, 4.2)      # least, largest
 RESOLUTION = 200               # dots per inch
@@ -70,7 +71,8 @@ def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) 
     width = min((WIDTH - LEFT - right - SCENE_GAP*(n - 1))/n, SCENE_HEIGHT[1]*1.5)
     height = float(np.clip(width*(views[0][3] - views[0][2])/(views[0][1] - views[0][0]),
                            *SCENE_HEIGHT))
-    total = TOP + height + ROW_GAP + PANEL_HEIGHT + BOTTOM
+    gap = ROW_GAP if scene.order is None else BARE_ROW_GAP
+    total = TOP + height + gap + PANEL_HEIGHT + BOTTOM
     figure.set_size_inches(WIDTH, total)
     base = total - TOP - height
 
@@ -149,7 +151,7 @@ def _draw_statics(panels: list[Axes], history: NDArray[np.void], force: Force, l
     if load is not None:
         draw_load(panels[0], load)
     else:
-        missing.append((panels[0], "no reactions in the result\n(asked for by *NODE FILE, RF)"))
+        missing.append((panels[0], "supports bear no load, or the result\nhas no reactions (*NODE FILE, RF)"))
     if solves:
         draw_convergence(panels[1], solves)
     else:

@@ -88,5 +88,5 @@ def _file_lines(paths: ResultPaths) -> list[str]:
         if path.is_file():
             lines.append(f"  {what:<20}{path}")
         elif path == paths.picture:
-            lines.append(f"  {what:<20}(none yet: python -m emcon plot {paths.base})")
+            lines.append(f"  {what:<20}(none yet: emcon plot {paths.base})")
     return lines

@@ -84,13 +84,13 @@ contains
 
       associate (step => scene%step(k))
          if (step_initiation(step) == initiation_velocity_update) call add_error(reader%log, &
-            step%origin, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE pushes masses, but a surface " &
+            step%origin, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE needs masses, but a surface " &
             // "in contact is of a MASSLESS section; use PERSISTENT or MASSLESS")
          if (step_initiation(step) /= initiation_massless) return
          call mark_joined(scene, is_joined)
          if (any(is_joined .and. is_bare)) call add_error(reader%log, step%origin, &
-            "*CONTACT INITIATION, TYPE=MASSLESS balances MASSLESS sections in contact by " // &
-            "themselves, but one is in a *TIE or an *EQUATION; use PERSISTENT")
+            "*CONTACT INITIATION, TYPE=MASSLESS is not for MASSLESS sections in contact that " // &
+            "are also in a *TIE or an *EQUATION; use PERSISTENT")
       end associate
    end subroutine check_step
 

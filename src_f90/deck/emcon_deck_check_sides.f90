@@ -49,17 +49,17 @@ contains
       is_bent = seen(1) > max(seen_turn, coarse_ratio*seen(2))
       associate (name => scene%surface(pair%master)%name)
          if (is_bent) then
-            advice = " has edges over which master surface " // name // " turns by " &
-               // to_text(seen(1), 3) // " degrees and would push it sideways; the rounder one " &
-               // "should be the slave"
+            advice = " has edges along which master surface " // name // " turns by " &
+               // to_text(seen(1), 3) // " degrees, which makes tangential forces wrong; the " &
+               // "rounder one should be the slave"
          else if (slave%length > large_ratio*master%length) then
             if (coarse_ratio*slave%mean < master%mean) return
             advice = " is " // to_text(slave%length/master%length, 3) // " times as long as " &
                // "master surface " // name // "; the smaller one should be the slave"
          else if (ratio > coarse_ratio) then
             advice = " has edges " // to_text(ratio, 3) // " times as long as those of master " &
-               // "surface " // name // " and would push its corners sideways; the finer one " &
-               // "should be the slave"
+               // "surface " // name // ", which makes tangential forces at its corners wrong; " &
+               // "the finer one should be the slave"
          end if
       end associate
    end subroutine find_advice

@@ -52,8 +52,8 @@ contains
                call option_number(reader, card, "PAD THICKNESS", "a length from 0 to 1e30: it " &
                   // "keeps surfaces apart; overlap at the start is resolved by *CONTACT " // &
                   "INTERFERENCE", 0.0_wp, 1.0e30_wp, reader%interaction(n)%offset)
-               call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
-                  // "left of the velocity at which bodies meet", 0.0_wp, 1.0_wp, &
+               call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: the " &
+                  // "velocity of separation over that of approach", 0.0_wp, 1.0_wp, &
                   reader%interaction(n)%restitution)
                call read_thickness(reader, card)
             case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
@@ -69,9 +69,9 @@ contains
                   if (n > 0) friction(n) = i
                   call read_friction(reader, card, reader%interaction(max(1, n))%friction, &
                      reader%interaction(max(1, n))%stick)
-                  call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
-                     // "left of the velocity along the surface of what sticks", 0.0_wp, 1.0_wp, &
-                     reader%interaction(max(1, n))%rebound)
+                  call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: the " // &
+                     "fraction of its tangential velocity with which a sticking node rebounds", &
+                     0.0_wp, 1.0_wp, reader%interaction(max(1, n))%rebound)
                else
                   if (behavior(max(1, n)) > 0) call card_error(reader, card, &
                      "the surface interaction has *SURFACE BEHAVIOR already")
@@ -100,7 +100,7 @@ contains
             if (any(surface%pressure%kind == [pressure_hard, pressure_tied]) .or. &
                surface%stick > 0.0_wp .or. .not. surface%friction > 0.0_wp) cycle
             surface%stick = 0.5_wp*pressure_slope(surface%pressure)
-            call card_warning(reader, card, "no slope of stick above 0 is given: half of the " &
+            call card_warning(reader, card, "no stick slope above 0 is given: half of the " &
                // "slope of the pressure is taken, " // to_text(surface%stick))
          end associate
       end do
@@ -294,11 +294,11 @@ contains
             call need_facets(reader, data, master, "master surface", &
                "; only the slave surface may, and only under NODE TO SURFACE; ")
             if (allocated(slave%wall)) call data_error(reader, data, "surface " // slave%name // &
-               " has a shape and no nodes that could be slaves; " // trim(merge( &
+               " is a wall, which has no nodes that could be slaves; " // trim(merge( &
                "one of the two must have nodes", "swap the two                  ", &
                allocated(master%wall))))
             if (allocated(master%wall) .and. pair%both_sides) call data_error(reader, data, &
-               "surface " // master%name // " has a shape and no nodes; leave out SIDES=BOTH")
+               "surface " // master%name // " is a wall without nodes; leave out SIDES=BOTH")
          end if
       end associate
       if (.not. data%ok) pair%master = 0
@@ -409,8 +409,8 @@ contains
       subroutine refuse(what)
          character(len=*), intent(in) :: what
 
-         call card_error(reader, card, what // " is not for TYPE=USER, contact that a program " // &
-            "gives")
+         call card_error(reader, card, what // " does not work with TYPE=USER, contact of a " // &
+            "program")
       end subroutine refuse
 
    end subroutine suit_user

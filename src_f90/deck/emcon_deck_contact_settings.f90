@@ -206,7 +206,7 @@ contains
          with = merge(k, first, step(k)%contact%initiation == initiation_massless)
          call add_error(reader%log, step(k)%origin, "step " // to_text(with) // " has *CONTACT " &
             // "INITIATION, TYPE=MASSLESS, step " // to_text(first + k - with) // " another one: " &
-            // "surfaces are massless in all dynamic steps or in none: mass does not come and go")
+            // "surfaces are massless in all dynamic steps or in none")
          return
       end do
    end subroutine check_massless

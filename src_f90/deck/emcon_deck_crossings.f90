@@ -45,7 +45,7 @@ contains
       why = ""
       associate (master => scene%surface(pair%master))
          if (allocated(master%wall)) then
-            why = "surface " // master%name // " has a shape and no edges of elements"
+            why = "surface " // master%name // " is a wall, which has no edges"
          else if (pair%formulation == formulation_user) then
             why = "the program that gives TYPE=USER decides what it constrains"
          else if (pair%interaction%pressure%kind /= pressure_hard) then

@@ -241,10 +241,24 @@ contains
          call data_error(reader, data, "load type " // name // " is known but not supported; " &
             // "supported: P, " // face_names("P", n_face) // ", GRAV, CENTRIF")
       case default
-         call data_error(reader, data, "unknown load type " // quoted(name) &
-            // "; known: P, " // face_names("P", n_face) // ", GRAV, CENTRIF")
+         call tell_unknown(reader, data, name, face_names("P", n_face))
       end select
    end subroutine read_load_type
+
+   !> A load type that does not exist; one in the first field means that the set is left out.
+   subroutine tell_unknown(reader, data, name, faces)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      character(len=*), intent(in) :: name, faces
+      character(len=:), allocatable :: first, hint
+
+      call get_name(reader, data, 1, "element or element set", first)
+      hint = ""
+      if (any(first == ["GRAV   ", "CENTRIF"])) hint = "; the first field names elements: " // &
+         "leave it empty for all of them, as in ', " // first // ", ...'"
+      if (data%ok) call data_error(reader, data, "unknown load type " // quoted(name) &
+         // "; known: P, " // faces // ", GRAV, CENTRIF" // hint)
+   end subroutine tell_unknown
 
    !> Three numbers from field `first` on.
    subroutine read_vector(reader, data, first, what, vector)

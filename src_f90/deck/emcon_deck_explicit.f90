@@ -33,7 +33,7 @@ contains
 
       if (.not. step%scheme%is_explicit) return
       if (step%time%event_fraction > 0.0_wp) call card_error(reader, reader%card(i_first), &
-         "*EVENTS are not of explicit steps: *EVENTS, OFF ends them")
+         "*EVENTS is not for explicit steps: end it by *EVENTS, OFF")
       do i = i_first + 1, size(reader%card)
          associate (card => reader%card(i))
             if (card%name == "STEP") exit

@@ -46,9 +46,9 @@ contains
          n = n + 1
          call get_real(reader, data, 1, "friction coefficient", coefficient)
          call drop_zeros(data, 1)
-         if (data%ok .and. data%n > 1) call get_real(reader, data, 1 + 1, "slope of stick", stick)
+         if (data%ok .and. data%n > 1) call get_real(reader, data, 1 + 1, "stick slope", stick)
          if (data%ok .and. stick < 0.0_wp) then
-            call data_error(reader, data, "the slope of stick " // to_text(stick) // " is negative")
+            call data_error(reader, data, "the stick slope " // to_text(stick) // " is negative")
             stick = 0.0_wp
          end if
          if (data%ok .and. coefficient < 0.0_wp) then
@@ -57,12 +57,12 @@ contains
             coefficient = 0.0_wp
          end if
          if (n == 2) then
-            call data_error(reader, data, "only one data line is read: the coefficient is one " &
-               // "for all rates, pressures and temperatures")
+            call data_error(reader, data, "only one data line is read: the coefficient is the " &
+               // "same for all rates, pressures and temperatures")
          else if (n == 1 .and. data%n > 1 + 1) then
-            call data_error(reader, data, "only the coefficient and a slope of stick are read: " &
-               // "nothing else bounds friction, and it depends on no rate, pressure or " // &
-               "temperature; leave out what stands behind them")
+            call data_error(reader, data, "only the coefficient and a stick slope are read: " &
+               // "friction has no other limit and depends on no rate, pressure or " // &
+               "temperature; leave out the other values")
          end if
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
@@ -103,8 +103,8 @@ contains
 
       associate (surface => pair%interaction)
          if (surface%pressure%kind == pressure_hard .and. surface%stick > 0.0_wp) then
-            call add_warning(reader%log, pair%origin, "*CONTACT PAIR: the slope of stick of its " &
-            // "*FRICTION has no effect: contact is hard, and what sticks does not move")
+            call add_warning(reader%log, pair%origin, "*CONTACT PAIR: the stick slope of its " &
+            // "*FRICTION has no effect: contact is hard, and a sticking contact does not slip")
          end if
       end associate
    end subroutine check_stick

@@ -66,8 +66,8 @@ contains
       if (.not. step%time%tolerance > 0.0_wp) return
       if (step%time%is_direct .and. step_is_dynamic(step)) call add_error(reader%log, &
          step%time%tolerance_origin, &
-         "TOLERANCE asks for increments of its own, DIRECT of *DYNAMIC " // &
-         "for those of the deck: leave out one; *TIME INTEGRATION without TOLERANCE ends it")
+         "TOLERANCE adapts increments, DIRECT of *DYNAMIC fixes them: " // &
+         "leave out one of the two; *TIME INTEGRATION without TOLERANCE ends it")
    end subroutine check_increments
 
    !> An error where a card of a static step asks for what is of time.
@@ -78,12 +78,12 @@ contains
       select case (card%name)
       case ("EVENTS")
          if (has_option(card, "OFF")) return
-         call card_error(reader, card, "*EVENTS are of dynamic steps: in statics nothing arrives " &
-            // "at a time of its own")
+         call card_error(reader, card, "*EVENTS is for dynamic steps: in static ones the time " &
+            // "is only a measure of the load")
       case ("TIMEINTEGRATION")
          if (.not. has_option(card, "TOLERANCE")) return
-         call card_error(reader, card, "TOLERANCE is of dynamic steps: increments of statics " // &
-            "follow how Newton's method converges")
+         call card_error(reader, card, "TOLERANCE is for dynamic steps: the size of static " // &
+            "increments depends on how Newton's method converges")
       end select
    end subroutine refuse_in_statics
 

@@ -177,7 +177,7 @@ module emcon_deck_keywords
       refusal_t("materials are elastic; leave it out where stresses stay below the yield stress", &
          "PLASTIC,CYCLIC HARDENING,DEFORMATION PLASTICITY,MOHR COULOMB,DRUCKER PRAGER," &
          // "CHANGE PLASTIC"), &
-      refusal_t("materials are elastic, and stay whole", "DAMAGE INITIATION,DAMAGE EVOLUTION"), &
+      refusal_t("materials are elastic, without damage", "DAMAGE INITIATION,DAMAGE EVOLUTION"), &
       refusal_t("materials are elastic; take the moduli of the time that is of interest", &
          "CREEP,VISCOELASTIC"), &
       refusal_t("use *HYPERELASTIC, NEO HOOKE", "HYPERFOAM"), &
@@ -213,8 +213,8 @@ module emcon_deck_keywords
          // "ASSIGNMENT"), &
       refusal_t("faces of solids have no thickness", "SURFACE PROPERTY ASSIGNMENT", &
          is_idle=.true.), &
-      refusal_t("nothing damps but *DAMPING", "BULK VISCOSITY", is_idle=.true.), &
-      refusal_t("pairs and materials stay as they are; *MODEL CHANGE takes pairs out or in", &
+      refusal_t("damping comes from *DAMPING only", "BULK VISCOSITY", is_idle=.true.), &
+      refusal_t("pairs and materials do not change; *MODEL CHANGE removes or adds pairs", &
          "CHANGE CONTACT TYPE,CHANGE SURFACE BEHAVIOR,CHANGE MATERIAL"), &
       refusal_t("prescribe displacements by *BOUNDARY", "PRE-TENSION SECTION"), &
       refusal_t("all sectors of a model deform alike", "SELECT CYCLIC SYMMETRY MODES"), &
@@ -228,7 +228,7 @@ module emcon_deck_keywords
          "BUCKLE"), &
       refusal_t("the procedures are *STATIC and *DYNAMIC", &
          "VISCO,GREEN,SENSITIVITY,SUBSTRUCTURE GENERATE,ELECTROMAGNETICS,CFD"), &
-      refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
+      refusal_t("request results by *NODE FILE, *EL FILE and *... PRINT", &
          "SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
       refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &
          is_idle=.true.), &
@@ -331,7 +331,7 @@ contains
       case ("ABSOLUTEPENETRATIONTOLERANCE", "RELATIVEPENETRATIONTOLERANCE")
          reason = " (contact is held exactly)"
       case ("SLIPTOLERANCE", "ELASTICSLIP")
-         reason = " (what sticks does not move)"
+         reason = " (a sticking contact does not slip)"
       case ("MASTER", "SLAVE")
          reason = " (the card is about all pairs)"
       case ("SMALLSLIDING")
@@ -347,7 +347,7 @@ contains
       case ("TAUMAX")
          reason = " (nothing but the coefficient bounds friction)"
       case ("SHEARTRACTIONSLOPE")
-         reason = " (what sticks does not move)"
+         reason = " (a sticking contact does not slip)"
       case ("EXPONENTIALDECAY", "TESTDATA", "ANISOTROPIC")
          reason = " (friction has one coefficient, for stick and slip, both ways and at any speed)"
       case ("TIEDNSET")

@@ -209,9 +209,9 @@ contains
       do i = 1, size(pair)
          if (pair(i)%interaction%pressure%kind /= pressure_hard .or. &
             pair(i)%origin%line == pair(i_soft)%origin%line) cycle
-         call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: it is hard, beside pairs " // &
-            "with a PRESSURE-OVERCLOSURE: give it one, too, or write *CONSTRAINT METHOD, " // &
-            "TYPE=PENALTY in the step, by which it gives way")
+         call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: it is hard, but other " // &
+            "pairs have a PRESSURE-OVERCLOSURE: give it one, too, or make it soft by " // &
+            "*CONSTRAINT METHOD, TYPE=PENALTY in the step")
          return
       end do
    end subroutine check_hard

@@ -70,7 +70,7 @@ contains
       if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of " &
          // new%name // " and the reference node " // to_text(scene%node%label(new%reference)) &
          // " lie " // trim(merge("on one line ", "in one plane", scene%n_dim == n_plane)) &
-         // ", which tells no rotation; put the reference node beside it")
+         // ", from which no rotation can be computed; put the reference node beside it")
    end subroutine read_card
 
    !> The nodes that NSET names join `node`, the elements that have no others the body.

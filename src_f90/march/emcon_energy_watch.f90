@@ -177,8 +177,8 @@ contains
 
       associate (largest => self%largest, rounding => energy_rounding(self))
          if (abs(self%stabilization) > half_digits*largest + rounding) call note_add(reasons, &
-            "loads do work on motions that nothing holds: stabilization takes " // &
-            to_text(self%stabilization, 3))
+            "loads move a body that no support holds: *CONTACT CONTROLS, STABILIZE does a " // &
+            "work of " // to_text(self%stabilization, 3))
          if (self%dynamic_error > energy_bar*largest + rounding) then
             call closing_text(digits)
             call note_add(reasons, "the energy balance does NOT close to " // digits // &
@@ -186,18 +186,19 @@ contains
          end if
          if (self%contact_made > half_digits*largest + rounding) call note_add(reasons, &
             "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
-            to_text(self%contact_made/largest, 3) // " of the largest, which bodies " // &
-            "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none")
+            to_text(self%contact_made/largest, 3) // " of the largest, which is " // &
+            "an error of the time integration; SCHEME=ENERGY MOMENTUM makes none")
          if (self%contact_kept > energy_bar*largest + rounding) call note_add(reasons, &
             "penalty contact has gained or lost an energy of " // &
             to_text(self%contact_kept, 3) // ", " // to_text(self%contact_kept/largest, 3) // &
-            " of the largest, as nodes inside a surface have left it at an end or a corner; " // &
-            "in the plane TYPE=NODE TO SURFACE of *CONTACT PAIR follows them; TYPE=NULL SPACE " // &
-            "of *CONSTRAINT METHOD stores no energy")
+            " of the largest: nodes that had penetrated left the surface at an end or corner; " // &
+            "use TYPE=NODE TO SURFACE of *CONTACT PAIR in the plane, or TYPE=NULL SPACE of " // &
+            "*CONSTRAINT METHOD")
          if (self%has_explicit .and. self%contact_taken > most_loss*largest + rounding) then
             call taken_text(self, text)
-            call note_add(reasons, text // " as explicit steps stop what touches: a finer mesh " &
-               // "loses less, TYPE=PENALTY of *CONSTRAINT METHOD or an implicit step nothing")
+            call note_add(reasons, text // " because explicit steps stop nodes that touch: a " &
+               // "finer mesh loses less; TYPE=PENALTY of *CONSTRAINT METHOD or an implicit step " &
+               // "loses nothing")
          end if
       end associate
    end subroutine energy_reasons
@@ -213,10 +214,11 @@ contains
          if (.not. self%contact_taken > least) return
          call taken_text(self, text)
          if (.not. self%has_explicit) then
-            call note_add(warnings, text // " which *CONTACT INITIATION, " // &
-               "TYPE=PERSISTENT or MASSLESS with SCHEME=ENERGY MOMENTUM keeps")
+            call note_add(warnings, text // " because gaps close exactly; " // &
+               "*CONTACT INITIATION, TYPE=PERSISTENT or MASSLESS with SCHEME=ENERGY MOMENTUM " // &
+               "conserves it")
          else if (.not. self%contact_taken > most) then
-            call note_add(warnings, text // " as explicit steps stop what touches")
+            call note_add(warnings, text // " because explicit steps stop nodes that touch")
          end if
       end associate
    end subroutine energy_warnings

@@ -108,7 +108,7 @@ contains
             call raise(error, err_input, where_text(scene, &
                scene%step(self%state%clock%i_step)%origin) // ": error: node " // &
                to_text(scene%node%label((numbering%dof(k) - 1)/size(scene%x, 1) + 1)) // &
-               " has no mass: in an explicit step all that moves freely needs some")
+               " has no mass: in an explicit step all nodes that are not prescribed need mass")
             return
          end do
          if (allocated(self%explicit%mass)) deallocate(self%explicit%mass)

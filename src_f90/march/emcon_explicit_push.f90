@@ -83,8 +83,8 @@ contains
             call kept_factor_take(kept, explicit%set, .true., is_fit, error)
             if (.not. (is_fit .or. allocated(error))) call raise(error, err_analysis, &
                "the velocities at time " // to_text(self%state%clock%time, 9) &
-               // " cannot be held: contacts, ties and equations depend on each other, or " // &
-               "are too many; leave some out, or take an implicit step")
+               // " have no solution: contacts, ties and equations are redundant or " // &
+               "contradict each other; leave some out, or use an implicit step")
             if (.not. allocated(error)) call kept_factor_correct(kept, explicit%set, residual, dq, &
                error)
             if (allocated(error)) return

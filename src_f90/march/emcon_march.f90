@@ -150,9 +150,9 @@ contains
          end if
          if (state%clock%is_off_grid) then
             call raise(error, err_input, "time " // to_text(state%clock%time, 9) &
-               // " lies between " // "two increments of the deck; go on to time " &
+               // " lies between " // "two increments of the deck; continue to time " &
                // to_text(state%clock%start_time + march_grid_time(self, step, state%clock%n_grid &
-               + 1), 9) // " with a step of a size of its own")
+               + 1), 9) // " by a step whose size you give")
             return
          end if
          stride = min(state%clock%grid_stride, march_next_corner(self, state%clock%n_grid) &

@@ -335,7 +335,7 @@ contains
                // ": the interference of " // to_text(interference, 3) // " is small compared " // &
                "with the distance of faces from the curves, and may be wrong by " // &
                "" // to_text(doubt, 2) // &
-               "; smaller faces, or nodes that meet nodes, are better")
+               "; use smaller faces, or meshes whose nodes meet")
          end associate
       end associate
    end subroutine tell_curves
@@ -521,7 +521,8 @@ contains
          if (.not. step_is_dynamic(step) .or. .not. step%time%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
          call raise(error, err_input, where_text(scene, step%time%tolerance_origin) &
-            // ": error: TOLERANCE= needs a scheme that tells its error, and this one does not")
+            // ": error: TOLERANCE= needs a scheme with an estimate of its error; use " // &
+            "SCHEME=ENERGY MOMENTUM")
       end associate
    end subroutine check_tolerance
 

@@ -325,8 +325,8 @@ contains
             body => self%system%space%body)
          if (.not. support%is_needed) return
          brought = active_set_brought(self%active)
-         if (brought > 0.0_wp) call note_add(increment%warnings, support%brought_text // ", on " &
-            // "which no load does work: moved over a gap of " // to_text(brought, 3) &
+         if (brought > 0.0_wp) call note_add(increment%warnings, support%brought_text // &
+            "; no load does work on it: moved over a gap of " // to_text(brought, 3) &
             // " onto the surface nearest to it")
          if (.not. allocated(support%text)) return
          call tell_stabilized(self%active%support, increment)
@@ -353,8 +353,8 @@ contains
          if (support%told == support%text(:n)) return
       end if
       support%told = support%text(:n)
-      call note_add(increment%warnings, support%text // ", on which no load does work: the " // &
-         "smallest motion is taken, as STABILIZE asks for")
+      call note_add(increment%warnings, support%text // "; no load does work on it: the " // &
+         "smallest motion is taken, as STABILIZE says")
    end subroutine tell_stabilized
 
    !> Add the works of the step. With inertia the sums are exact for discrete gradients (see

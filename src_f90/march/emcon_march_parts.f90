@@ -132,7 +132,7 @@ contains
       call march_stop(self, scene, last, "an increment of h = " // to_text(increment%h) // &
          " was tried in " // to_text(parts%n) // " parts, the smallest of h = " // &
          to_text(parts%h_least) // ", and " // to_text(100.0_wp*increment%done/increment%h, 3) // &
-         " % of it are done" // nodes // "; give smaller increments from here on", error)
+         " % of it is complete" // nodes // "; give smaller increments from here on", error)
    end subroutine stop_crawl
 
    !> One step. Where it fails because nodes without mass find no balance these take their mass back
@@ -254,8 +254,8 @@ contains
       associate (name => scene%element%kinds(solid%kind(e))%name)
          text = text // "; elements of type " // trim(name) // ", as " &
             // to_text(solid%deck%label(e)) &
-            // ", have motions without strain if there is a single one or a single row of them: " &
-            // "take two across"
+            // ", have zero-energy modes if there is a single one or a single row of them: " // &
+            "use two rows"
          if (name(len_trim(name):len_trim(name)) == "R") text = text // ", or " &
             // name(:len_trim(name) - 1)
       end associate
@@ -284,17 +284,17 @@ contains
       case (step_too_far)
          call too_far_text(self, scene, text)
       case (step_stands_off)
-         text = "a contact would close over more than the gap tolerance"
+         text = "a contact would act across a gap larger than GAP TOLERANCE"
       case (step_not_held)
          text = "nothing resists a motion: " // self%active%support%text
-         if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
-         if (active_set_slides(self%active)) text = text // ", where friction is at its limit"
+         if (.not. self%active%support%is_pushed) text = text // "; no load does work on it"
+         if (active_set_slides(self%active)) text = text // "; friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
          if (active_set_slides(self%active)) text = text // ", or more *FRICTION"
          if (.not. self%active%support%is_pushed) text = text // &
-            ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+            ", or take the smallest such motion by *CONTACT CONTROLS, STABILIZE"
       case (step_unbalanced)
-         text = "nodes without mass find no equilibrium where contacts open or close"
+         text = "nodes without mass have no equilibrium where contacts open or close"
       case (step_overlaps)
          text = "bodies would overlap where no contact acts"
       case (step_rough)
@@ -321,12 +321,12 @@ contains
       character(len=:), allocatable :: nodes
       integer :: least
 
-      text = "which contacts act, stick and slide does not settle"
+      text = "the search for the contacts that act, stick and slide does not converge"
       associate (n_change => self%active%candidates%n_change)
          least = min(2, maxval(n_change))
          if (least > 0) then
             call nodes_text(self, scene, n_change >= least, nodes)
-            text = text // ": it is another one in each try at slave nodes " // nodes
+            text = text // ": its result changes from try to try at slave nodes " // nodes
          end if
       end associate
       if (.not. self%active%rules%may_cut) text = text // "; allow for smaller increments, or " // &
@@ -343,7 +343,7 @@ contains
       text = "a contact begins too deep or slides too far for one increment"
       remedy = "give the other surface longer edges there"
       if (active_set_goes_on(self%active)) then
-         text = "each solution of the increment meets other faces than it was found for"
+         text = "the solutions of the increment touch other faces than those assumed for them"
          remedy = "let the smaller surface be the slave, or take another TYPE of *CONTACT PAIR"
       end if
       if (.not. any(self%active%candidates%is_blamed)) return

@@ -46,8 +46,8 @@ contains
          when = "at the start"
          if (i_step > 1) when = "as step " // to_text(i_step) // " takes their pair in,"
       end associate
-      if (overlap%is_beside) text = text // "; no node of one need be in the other, as where " // &
-         "edges cross or faces lie in one plane"
+      if (overlap%is_beside) text = text // "; edges may cross, or faces lie in one plane, " // &
+         "without a node inside the other body"
       associate (pair => scene%pair(k))
          cure = "; move the bodies apart"
          if (march%state%clock%i_step > 1) cure = cure // " before, or let a *STATIC step " // &

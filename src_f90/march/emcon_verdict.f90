@@ -416,14 +416,14 @@ contains
       type(verdict_t), intent(in) :: self
       character(len=:), allocatable, intent(out) :: text   !! a sentence
 
-      text = "contact forces act across gaps, " // to_text(stand_off_mean(self%stand_off), 2) // &
-         " of an edge in the mean over the impulse: smaller increments, "
+      text = "contact forces act across gaps of " // to_text(stand_off_mean(self%stand_off), 2) // &
+         " of an edge on average (weighted by impulse): smaller increments, "
       ! Where masses are taken away it is between nodes that have kept theirs.
       if (self%has_massless) then
-         text = text // "or TYPE=ADMISSIBLE of *CONTACT INITIATION, close them"
+         text = text // "or TYPE=ADMISSIBLE of *CONTACT INITIATION, make them smaller"
       else
-         text = text // "GAP TOLERANCE, or TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION " // &
-            "close them"
+         text = text // "a smaller GAP TOLERANCE, or TYPE=ADMISSIBLE or MASSLESS of *CONTACT " // &
+            "INITIATION make them smaller"
       end if
    end subroutine stand_off_text
 

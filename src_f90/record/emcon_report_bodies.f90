@@ -280,7 +280,7 @@ contains
       type(body_t), intent(in) :: body
       character(len=:), allocatable, intent(out) :: name
 
-      name = "small or large displacements by NLGEOM"
+      name = "large displacements in steps with NLGEOM"
       if (body%n_linear > 0) name = "linear in part"
       if (body%n_linear == body%n_element) name = "linear"
       if (body%n_corotated > 0) name = "corotated in part"

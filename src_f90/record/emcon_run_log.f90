@@ -143,8 +143,8 @@ contains
          end associate
       end do
       if (has_guards) call note_add(notes, "contact: guards stop nodes that the pairs do not: " // &
-         "corners that are deeper than " // to_text(corner_slack) // " of an edge, other nodes " &
-         // "than " // to_text(guard_slack))
+         "corners deeper than " // to_text(corner_slack, 3) // " of an edge, other nodes " // &
+         "deeper than " // to_text(guard_slack))
    end subroutine add_watching
 
    !> What step `k` is, and where contact is computed otherwise than in the step before.

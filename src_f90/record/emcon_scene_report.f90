@@ -384,9 +384,9 @@ contains
       cure = "; *CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
          "elements thick"
       ! What a fifth of the mass stands for, of a body whose whole outline has contacts.
-      if (allocated(scene%deck%keeps_mass)) cure = "; they are smooth where bodies are " // &
-         trim(merge("ten     ", "fourteen", scene%n_dim == n_plane)) // &
-         " elements across, and lose the mass there"
+      if (allocated(scene%deck%keeps_mass)) cure = "; they are smooth if bodies are at " // &
+         "least " // trim(merge("ten     ", "fourteen", scene%n_dim == n_plane)) // &
+         " elements thick: their surfaces are then without mass"
       call row_put(row, "courant_number", scene%step(k)%time%h/transit, &
          " # of the wave transit time " &
          // "of the smallest element: contact forces of nodes with mass jump up and down" // cure)

@@ -119,7 +119,7 @@ contains
          if (self%count%guarded > 0) then
             call guard_advice(scene%pair, text)
             call note_add(lines, "guards act in " // to_text(self%count%guarded) // &
-               " increments; to need none: " // text)
+               " increments; to avoid that: " // text)
          end if
          if (self%stand_off%largest > rounding) call note_add(lines, &
             "largest stand-off (gap across which contact forces act) " // &
@@ -169,17 +169,17 @@ contains
       type(notes_t), intent(inout) :: lines
 
       if (ledger%restitution > 0.0_wp) call note_add(lines, "impacts with RESTITUTION below 1 " // &
-         "took " // to_text(ledger%restitution, 9) // ", part of contact work")
-      if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "SCHEME=ENERGY DECAYING took " // &
+         "dissipated " // to_text(ledger%restitution, 9) // ", part of contact work")
+      if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "SCHEME=ENERGY DECAYING dissipated " // &
          to_text(ledger%decay, 9))
-      if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "damping took " // &
+      if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "damping dissipated " // &
          to_text(resolved(self, ledger%damping), 9))
-      if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took " // &
+      if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction dissipated " // &
          to_text(resolved(self, ledger%friction), 9) // "; friction law satisfied to " // &
          to_text(verdict_law_violation(self), 2) // " of the largest force, " // &
          to_text(verdict_jump_violation(self), 2) // " with jumps of velocity")
-      if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
-         to_text(resolved(self, ledger%contact_damping), 9))
+      if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping " // &
+         "dissipated " // to_text(resolved(self, ledger%contact_damping), 9))
       if (self%penalty%give > 0.0_wp) call note_add(lines, "largest penetration of contact " // &
          to_text(self%penalty%give, 3) // " of an edge, at time " // to_text(self%penalty%time, &
          9) // "; stored at the end " // to_text(ledger%contact_energy, 9))

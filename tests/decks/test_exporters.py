@@ -224,7 +224,7 @@ def test_cards_that_change_nothing_are_named_in_the_log(tmp_path):
 
 #: Exporter, text, what stands there instead, exit code, what is told; the first line is checked.
 FORMS = [
-    ("freecad", "LINEAR\n1000000", "LINEAR\n1000000\n*FRICTION\n0.2", 0, "no slope of stick above 0 is given: half of the slope of the "
+    ("freecad", "LINEAR\n1000000", "LINEAR\n1000000\n*FRICTION\n0.2", 0, "no stick slope above 0 is given: half of the slope of the "
      "pressure is taken, 500000"),
     ("freecad", "LINEAR\n1000000", "EXPONENTIAL\n0.01, 100\n*FRICTION\n0.2", 0, "pressure is taken, 23025.9"),
     ("freecad", "LINEAR\n1000000", "TABULAR\n0, 0\n100, 0.01\n300, 0.02\n*FRICTION\n0.2", 0, "pressure is taken, 7500"),

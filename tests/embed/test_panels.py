@@ -288,6 +288,25 @@ def test_curves_of_many_pairs_differ() -> None:
     assert len(drawn) == len(curves)
 
 
+def test_many_curves_give_way_to_lengths_of_forces(tmp_path: Path) -> None:
+    """Friction on many pairs: a curve each, no more than colours, and the number of the others."""
+    subprocess.run([PROGRAM, ROOT/"input_decks"/"dominoes.inp", "--quiet", "--output", tmp_path,
+                    "--set", "t_end=0.3"], check=True, timeout=100)
+    paths = locate(tmp_path/"dominoes")
+    force = draw(paths)[0].axes[-1]
+    names = [text.get_text() for text in force.get_legend().get_texts()]
+    history = read_history(paths)
+    count = sum(name.endswith("_active") for name in history.dtype.names if name.startswith("pair"))
+    length = [np.linalg.norm([history[f"pair{k}_force_{axis}"] for axis in "xyz"], axis=0)
+              for k in range(1, count + 1)]
+    drawn = [line.get_ydata() for line in force.lines if len(line.get_ydata()) == len(history)]
+    largest = sorted(length, key=lambda values: -values.max())[:5]
+    assert count > 5 and len(drawn) == 5 and names[-1] == f"{count - 5} smaller"
+    assert all(any(np.array_equal(one, other) for other in length) for one in drawn)
+    assert [one.max() for one in drawn] == [one.max() for one in largest]
+    assert labels(force)[1] == f"contact force $|F|$ {UNITS['force']}"
+
+
 def test_pairs_with_one_master_have_names_of_their_own(tmp_path: Path) -> None:
     (*_, force), _ = panels(tmp_path, "ball_in_bowl", "--set", "t_end=0.1")
     shown = {text.get_text() for text in force.get_legend().get_texts()}

@@ -12,7 +12,7 @@ TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
 #: Languages of other blocks, which `test_cmake`, `test_host_solid` and `test_interface_c` compile.
 COMPILED = {"embedding": {"", "cmake", "c", "cpp", "fortran"}}
 #: Their runs take seconds.
-LONG = {"7 Studies", "11 What settings buy"}
+LONG = {"7 Studies", "11 Cost and error of settings"}
 CHAPTERS = [pytest.param(path, title, id=f"{path.stem}-{title}", marks=[pytest.mark.long]*(title in LONG))
             for path, text in TEXTS.items() for title in examples(text)]
 

@@ -275,7 +275,7 @@ def test_what_the_reference_is_not_certain_of_counts() -> None:
     study = study_of(ERRORS, 0.1, "impulse:0.05")
     words = goal_words(study, study.references[0], study.goals)
     assert "not met. The best, h=0.01, initiation=ADMISSIBLE, comes to impulse 1.1e-01" in words
-    assert "2.2 times the goal" in words and "may be wrong by more than that in impulse" in words
+    assert "2.2 times the goal" in words and "uncertainty of the reference is larger than the goal in impulse" in words
     assert not goals_met(study)
 
 

@@ -181,7 +181,7 @@ def test_errors_of_the_impact_and_a_goal_too_far(tmp_path: Path) -> None:
                  "--goal", "rebound:1e-13", "--goal", "displacement:1", code=1)
     text = " ".join(done.stdout.split())
     assert "goal rebound:1e-13: not met. The best" in text and "times the goal" in text
-    assert "The reference itself may be wrong by more than that in rebound" in text
+    assert "The uncertainty of the reference is larger than the goal in rebound" in text
     assert "goal displacement:1: the cheapest setting is h=" in text
     assert "goal rebound:1e-13 and displacement:1: not met" in text
     rows = table(tmp_path)

@@ -475,8 +475,8 @@ contains
                // to_text(k))
             if (allocated(error)) return
             if (k == 2) cycle
-            told = "body of C, on which no load does work: moved over a gap of 0.25 onto"
-            if (k < 4) told = support%text // ", on which no load does work: the smallest motion"
+            told = "body of C; no load does work on it: moved over a gap of 0.25 onto"
+            if (k < 4) told = support%text // "; no load does work on it: the smallest motion"
             call check_true(error, index(increment%warnings%item(1)%text, told) == 1, told)
          end do
       end associate

@@ -81,8 +81,9 @@ contains
    subroutine test_reasons(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: status(2) = [step_cycling, step_too_far]
-      character(len=*), parameter :: told(2) = [character(len=50) :: &
-         "does not settle: it is another one in each try", "slides too far for one increment"]
+      character(len=*), parameter :: told(2) = [character(len=53) :: &
+         "does not converge: its result changes from try to try", &
+         "slides too far for one increment"]
       type(stepper_t) :: stepper
       character(len=:), allocatable :: text
       integer :: i, k
@@ -120,9 +121,9 @@ contains
          step_passes_event, 99]
       character(len=*), parameter :: told(11) = [character(len=90) :: "it is refused", &
          "Newton's method does not converge (relative residual 0.25 after 7 iterations)", &
-         "the system is singular", "a contact would close over more than the gap tolerance", &
+         "the system is singular", "a contact would act across a gap larger than GAP TOLERANCE", &
          "bodies would overlap where no contact acts", &
-         "nodes without mass find no equilibrium where contacts open or close", &
+         "nodes without mass have no equilibrium where contacts open or close", &
          "the error is 0.5 times TOLERANCE", &
          "contact begins or ends: the error is 0.5 times TOLERANCE", &
          "gaps do not close to TOLERANCE of *CONSTRAINT METHOD in ", &
@@ -164,8 +165,8 @@ contains
                march%active%support%is_pushed = i == 1
                call march_reason(march, stepper%scene, step_not_held, text)
                expected = "nothing resists a motion: body A"
-               if (i == 0) expected = expected // ", on which no load does work; add *BOUNDARY " &
-                  // "conditions, or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+               if (i == 0) expected = expected // "; no load does work on it; add *BOUNDARY " // &
+                  "conditions, or take the smallest such motion by *CONTACT CONTROLS, STABILIZE"
                if (i == 1) expected = expected // "; add *BOUNDARY conditions"
                call check_equal(error, text, expected, "not held")
             end do
@@ -189,9 +190,8 @@ contains
          if (allocated(error)) return
          call march_reason(stepper%march, stepper%scene, step_singular, text)
          expected = "the system is singular"
-         if (k == 2) expected = expected // "; elements of type CPE8R, as 1, have motions " &
-            // "without strain if there is a single one or a single row of them: take two " &
-            // "across, or CPE8"
+         if (k == 2) expected = expected // "; elements of type CPE8R, as 1, have zero-energy " &
+            // "modes if there is a single one or a single row of them: use two rows, or CPE8"
          call check_equal(error, text, expected, "reason")
          call stepper_close(stepper)
          stepper = stepper_t()
@@ -324,7 +324,7 @@ contains
       if (allocated(error)) return
       call stepper_advance(stepper, increment, stopped)
       call check_error(error, stopped, err_analysis, "was tried in 4000 parts, the smallest " // &
-         "of h = 4.88281E-04, and 64.9 % of it are done; give smaller increments", "stopped")
+         "of h = 4.88281E-04, and 64.9 % of it is complete; give smaller increments", "stopped")
       call check_near(error, stepper%march%state%clock%time, 2659.0_wp/2048.0_wp, 0.0_wp, 1.0_wp, &
          "time")
       call stepper_close(stepper)

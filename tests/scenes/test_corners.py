@@ -154,7 +154,7 @@ def test_an_increment_has_at_most_4000_parts(tmp_path):
             continue
         stopped += 1
         told = re.search(rf"stops at time ([\d.]+): an increment of h = {h} was tried in 4000 parts, the "
-                         r"smallest of h = ([\d.]+), and ([\d.]+) % of it are done; in them contact "
+                         r"smallest of h = ([\d.]+), and ([\d.]+) % of it is complete; in them contact "
                          r"begins and ends at slave nodes [\d, ]+; give smaller", done.stderr)
         time, least, part = (float(value) for value in told.groups())
         assert done.returncode == 3 and part == pytest.approx(100*time/h, rel=1e-2)

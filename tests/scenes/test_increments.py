@@ -242,4 +242,4 @@ def test_scheme_has_to_tell_its_error(tmp_path):
     (tmp_path/"a.inp").write_text(bar(["*TIME INTEGRATION, SCHEME=BDF2, TOLERANCE=1e-3"]))
     done = emcon("run", tmp_path/"a.inp", "--quiet")
     assert done.returncode == 2
-    assert re.search(r"a.inp:\d+: error: TOLERANCE= needs a scheme that tells its error", done.stderr)
+    assert re.search(r"a.inp:\d+: error: TOLERANCE= needs a scheme with an estimate of its error", done.stderr)

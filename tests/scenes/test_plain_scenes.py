@@ -111,7 +111,7 @@ def test_guards_keep_momenta_and_are_told(tmp_path):
     # 18 nodes and 25 increments, each with Newton's rounding of a few dozen operations.
     assert change <= 1e3*EPSILON*np.abs(momentum).max()
     assert "contact: guards stop nodes that the pairs do not" in done.run.log
-    advice = re.search(r"guards act in \d+ increments; to need none: (.*)", done.run.log)[1]
+    advice = re.search(r"guards act in \d+ increments; to avoid that: (.*)", done.run.log)[1]
     assert advice.startswith("TYPE=NODE TO SURFACE, ")
 
 

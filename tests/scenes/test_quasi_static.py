@@ -213,7 +213,7 @@ def test_what_is_massless_must_be_held(tmp_path):
 def test_contact_that_pushes_masses_is_refused(tmp_path):
     deck = massless(coarse_ring(), "BLOCK")
     run = run_deck(deck, tmp_path, code=2, initiation="VELOCITY UPDATE")
-    assert "TYPE=VELOCITY UPDATE pushes masses, but a surface in contact is of a MASSLESS" \
+    assert "TYPE=VELOCITY UPDATE needs masses, but a surface in contact is of a MASSLESS" \
         in run.errors
     scene = Scene(0.01, 0.1)
     scene.block("LOW", (0, 0), (3, 1), (3, 1)).hold("LOW", lambda x, y: y < .1)
@@ -223,7 +223,7 @@ def test_contact_that_pushes_masses_is_refused(tmp_path):
     deck = massless(scene.deck(AUTO), "PAD")
     deck.insert("*TIE, NAME=JOINT\nB, A\n", before="*STEP")
     run = run_deck(deck, tmp_path/"tie", code=2, initiation="MASSLESS")
-    assert "balances MASSLESS sections in contact by themselves, but one is in a *TIE" in run.errors
+    assert "is not for MASSLESS sections in contact that are also in a *TIE" in run.errors
     run_deck(deck, tmp_path/"tie")
 
 

@@ -182,7 +182,7 @@ def test_table_has_all_cells():
 @pytest.mark.parametrize("treatment, h, text", list(energy_table()))
 def test_energy_table(ring, treatment, h, text):
     total = ring(treatment, h).history["total"]
-    held = re.match(r"held to (\S+)", text)
+    held = re.match(r"conserved to (\S+)", text)
     loss = re.match(r"loses (\S+) %", text)
     if held:
         assert abs(total - total[0]).max() <= float(held[1])*total[0]
@@ -266,4 +266,4 @@ def test_other_codes_are_those_of_the_bench():
                        README.read_text(), re.MULTILINE)
     assert len(shown) == 4
     for code, time, energy in shown:
-        assert bench[code] == (time, energy.removeprefix("kept to "))
+        assert bench[code] == (time, energy.removeprefix("below "))

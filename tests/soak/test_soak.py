@@ -69,7 +69,7 @@ def test_scenes_whose_contacts_need_a_soft_problem(tmp_path):
 def test_what_a_warning_tells_is_not_called_good(tmp_path):
     """Directions of forces, of contact across gaps; nothing else, and no other warning."""
     result = judge_seed(1, tmp_path)
-    gaps = ["contact forces act across gaps, 0.3 of an edge in the mean over the impulse: ..."]
+    gaps = ["contact forces act across gaps of 0.3 of an edge on average (weighted by impulse): ..."]
     for faults, warnings, is_wrong in [({"push": "x"}, gaps, False), ({"push": "x"}, [], True),
                                        ({"push": "x", "energy": "y"}, gaps, True)]:
         lines, wrong = table([result | {"faults": faults, "warnings": warnings}])

@@ -1,4 +1,4 @@
-"""`python -m emcon study`: many runs of a deck, and what their settings buy."""
+"""`python -m emcon study`: many runs of a deck, and what settings cost."""
 
 from __future__ import annotations
 

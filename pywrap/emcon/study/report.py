@@ -182,7 +182,7 @@ def _of_reference(study: Study, reference: Reference) -> str:
                      + "".join(f"{_size(errors.get(n)):>{w}}" for n, w in zip(names, width))
                      + ("   the reference" if run is reference.run else ""))
     if reference.limits:
-        lines.append(f"  {'it may be wrong by':<{knobs + 9}}"
+        lines.append(f"  {'uncertainty':<{knobs + 9}}"
                      + "".join(f"{'' if n in OWN else _size(reference.uncertainty(n)):>{w}}"
                                for n, w in zip(names, width)))
     return "\n".join(line.rstrip() for line in lines)
@@ -288,8 +288,8 @@ def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], text: st
              + f", {over[k]:.2g} times the goal"]
     vague = [g.name for g in goals if reference.uncertainty(g.name) > g.tolerance]
     if vague:
-        words.append(f"The reference itself may be wrong by more than that in {', '.join(vague)}: "
-                     f"a finer {study.plan.step} is due")
+        words.append(f"The uncertainty of the reference is larger than the goal in {', '.join(vague)}: "
+                     f"use a smaller {study.plan.step}")
     return ". ".join(words)
 
 
