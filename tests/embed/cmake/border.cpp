@@ -1,6 +1,7 @@
-// The ring impact by emcon.hpp: run, states kept, conditions changed, functions given, failures.
+// A test of what emcon.hpp does: runs of the ring impact, states kept, functions given, calls of hosts,
+// failures and exceptions. An example of a host is blocks.cpp.
 //
-// usage: host DECK
+// usage: border DECK
 #include <emcon.hpp>
 
 #include <cmath>
