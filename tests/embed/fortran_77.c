@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MARK = 1146438477, ROOM = 200 };
+enum { MARK = 1146438477 };
 
 static int word_of(const int *ih) { return ih[0] ^ (ih[1] << 7) ^ MARK; }
 
@@ -23,6 +23,12 @@ static emcon_model *model_of(const int *ih)
 
    if (ih[2] == word_of(ih)) memcpy(&model, ih, sizeof model);
    return model;
+}
+
+/* Room for n times m numbers of a size; NULL, which the library refuses, if there is none. */
+static void *room(int n, int m, size_t of_one)
+{
+   return n > 0 && m > 0 ? malloc((size_t)n*(size_t)m*of_one) : NULL;
 }
 
 /* Make a model of N nodes at X(ND,N), ND = 2 or 3. Also where this fails there is a handle to free.
@@ -41,30 +47,31 @@ void emnew_(int *ih, const int *nd, const int *n, const double *x, int *ierr)
  * number. */
 void emsurf_(const int *ih, const int *ne, const int *ied, int *is, int *ierr)
 {
-   int edge[2*ROOM], i;
+   int *edge = room(*ne, 2, sizeof *edge), i;
 
-   *ierr = EMCON_ERROR_INPUT;
-   if (*ne > ROOM) return;
-   for (i = 0; i < 2**ne; i++) edge[i] = ied[i] - 1;
+   for (i = 0; edge && i < 2**ne; i++) edge[i] = ied[i] - 1;
    *ierr = emcon_add_surface(model_of(ih), NULL, *ne, edge, is);
    ++*is;
+   free(edge);
 }
 
 /* In space: add a surface of NF faces IFACE(KN,NF), each of KN nodes, 3, 4, 6 or 8, the corners
  * counter-clockwise as seen from outside; IS becomes its number. */
 void emface_(const int *ih, const int *kn, const int *nf, const int *iface, int *is, int *ierr)
 {
-   int node[8*ROOM], kind[ROOM], offset[ROOM], i;
+   int *node = room(*kn, *nf, sizeof *node), *kind = room(*nf, 1, sizeof *kind);
+   int *offset = room(*nf, 1, sizeof *offset), i;
 
-   *ierr = EMCON_ERROR_INPUT;
-   if (*nf > ROOM || *kn > 8) return;
-   for (i = 0; i < *kn**nf; i++) node[i] = iface[i] - 1;
-   for (i = 0; i < *nf; i++) {
+   for (i = 0; node && i < *kn**nf; i++) node[i] = iface[i] - 1;
+   for (i = 0; kind && offset && i < *nf; i++) {
       kind[i] = *kn == 3 ? 5 : *kn == 4 ? 9 : *kn == 6 ? 22 : *kn == 8 ? 23 : 0;
       offset[i] = (i + 1)**kn;
    }
    *ierr = emcon_add_faces(model_of(ih), NULL, *nf, kind, offset, *kn**nf, node, is);
    ++*is;
+   free(node);
+   free(kind);
+   free(offset);
 }
 
 /* Add a contact pair of surfaces with the coefficient of friction FRICT. IFORM: see EMPAIR. */
@@ -82,8 +89,15 @@ void emrub_(const int *ih, const int *islave, const int *master, const int *ifor
 void empair_(const int *ih, const int *islave, const int *master, const int *iform,
              const int *iopt, const double *angle, int *ierr)
 {
-   emcon_pair_options options = {iopt[0], iopt[1], iopt[2], iopt[3], iopt[4], angle[0], angle[1]};
+   emcon_pair_options options = {0};
 
+   options.integration = iopt[0];
+   options.n_point = iopt[1];
+   options.multiplier = iopt[2];
+   options.normal = iopt[3];
+   options.smoothing = iopt[4];
+   options.normal_angle = angle[0];
+   options.smoothing_angle = angle[1];
    *ierr = emcon_add_pair(model_of(ih), *islave - 1, *master - 1, *iform, &options);
 }
 
@@ -148,16 +162,18 @@ void emstep_(const int *ih, const int *n, const int *m, const double *u0, double
 /* The energy that friction dissipates in the step that was solved last, of M contacts. */
 void emloss_(const int *ih, const int *m, double *loss, int *ierr)
 {
-   int way[ROOM], i;
-   double slip[2*ROOM], friction[2*ROOM];
+   double *slip = room(*m, 2, sizeof *slip), *friction = room(*m, 2, sizeof *friction);
+   int *way = room(*m, 1, sizeof *way), i;
    emcon_sizes sizes;
 
    *loss = 0;
-   *ierr = EMCON_ERROR_INPUT;
-   if (*m > ROOM) return;
    *ierr = emcon_get_slips(model_of(ih), *m, way, slip, friction);
    if (*ierr == EMCON_OK) *ierr = emcon_get_sizes(model_of(ih), &sizes);
-   for (i = 0; *ierr == EMCON_OK && i < *m*sizes.n_slip; i++) *loss += slip[i]*friction[i];
+   for (i = 0; *ierr == EMCON_OK && slip && friction && i < *m*sizes.n_slip; i++)
+      *loss += slip[i]*friction[i];
+   free(way);
+   free(slip);
+   free(friction);
 }
 
 /* Begin a step from U0(ND,N) by DU(ND,N). IWAS(M): contacts that acted before; IACT(M): those that
@@ -172,17 +188,16 @@ void embeg_(const int *ih, const int *n, const int *m, const double *u0, const d
 void emgap_(const int *ih, const int *n, const int *m, const double *u0, const double *du,
             int *near, double *g0, double *g1, int *ierr)
 {
-   emcon_gap gap[ROOM];
+   emcon_gap *gap = room(*m, 1, sizeof *gap);
    int i;
 
-   *ierr = EMCON_ERROR_INPUT;
-   if (*m > ROOM) return;
-   *ierr = emcon_get_gaps(model_of(ih), *n, u0, du, *m, gap);
+   *ierr = gap ? emcon_get_gaps(model_of(ih), *n, u0, du, *m, gap) : EMCON_ERROR_INPUT;
    for (i = 0; *ierr == EMCON_OK && i < *m; i++) {
       near[i] = gap[i].is_near;
       g0[i] = gap[i].gap0;
       g1[i] = gap[i].gap1;
    }
+   free(gap);
 }
 
 /* Select the contacts IACT(M). There are K. */
