@@ -8,7 +8,7 @@ module emcon_stepper_solve
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_multiply, csr_multiply_transposed, csr_t
    use emcon_errors, only : err_analysis, error_t, raise
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_that
    use emcon_stepper_contact, only : query_begin_contact, query_begin_damping, &
@@ -22,6 +22,10 @@ module emcon_stepper_solve
    public :: host_solver_t, query_solve_step
 
    integer, parameter :: most_iterates = 40
+   !> Round-off of what is computed: matrices are in double precision at the most.
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   !> Of the positions: a smaller motion that does not decrease is round-off of the host's solver.
+   real(wp), parameter :: is_small = eps**(2.0_wp/3.0_wp)
 
    !> The equations of a host, without contact.
    type, abstract :: host_solver_t
@@ -104,8 +108,6 @@ contains
       class(host_solver_t), intent(inout) :: solver
       real(wp), allocatable, intent(out) :: lam(:)         !! of the rows [M L/T^2]
       type(error_t), allocatable, intent(out) :: error
-      !> Of the positions: a motion below it that does not decrease is round-off of the solver.
-      real(wp), parameter :: is_small = 1.0e-10_wp
       real(wp) :: reach, length, last, motion(size(du, 1), size(du, 2))
       integer :: iterate
 
@@ -116,7 +118,7 @@ contains
          if (allocated(error)) return
          du = du + motion
          length = maxval(abs(motion))
-         if (length <= 4.0_wp*epsilon(length)*reach) return
+         if (length <= 4.0_wp*eps*reach) return
          if (last <= length .and. length < is_small*reach) return
          last = length
       end do
