@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from embed_tools import HERE, ROOT, SANITIZED, need, run
-from landing import landing
+from landing_block import landing
 
 from emcon import Stepper
 

@@ -138,7 +138,7 @@ def test_an_old_code_does_what_the_program_does(example: Path, form: int, kind: 
     assert drift < 1e-13 and (lost > 0) == (friction > 0)
     if SANITIZED:
         return                           # Python cannot load the library with a sanitizer in it
-    from landing import landing
+    from landing_block import landing
 
     from emcon import Stepper
 
