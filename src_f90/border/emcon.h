@@ -283,8 +283,8 @@ int emcon_give_mass(emcon_model *model, const emcon_csr *mass);
 /* ---- a model of a host code ------------------------------------------------------------------ */
 
 /* Instead of reading a deck: nodes, then surfaces, pairs and ties, then emcon_build. The host makes
- * the steps: see "contact over a step". Labels are the numbers of nodes, from 1. Complete hosts:
- * tests/embed/interface_bars.c and tests/embed/interface_springs.py. The notation is that of
+ * the steps, by emcon_solve_step or by all calls of "contact over a step". Labels are the numbers of
+ * nodes, from 1. A complete host: tests/embed/interface_bars.c. The notation is that of
  * docs/theory.md, sections 4 and 5. Units are consistent ones; the plane has thickness 1. */
 
 /* Nodes at the reference positions `x`, n_dim = 2 or 3. Nodes that are on no surface may be left
@@ -707,6 +707,30 @@ int emcon_update_active(emcon_model *model, int n_node, const double *u0 /* n_no
                         const double *lam /* n_selected */,
                         const double *magnitude /* n_node x n_dim, or NULL */, int n_constraint,
                         int *active /* n_constraint, in and out */, int *is_done, int *outcome);
+
+/* The equations of a host without contact, for emcon_solve_step: find the residual of the step by
+ * `du` (n_freedom = n_dim*n_node), and its derivative K by the unknowns at the end, from which
+ * `second` is subtracted (n_unknown x n_unknown). Add the residual to the last of the columns, which
+ * are stored one after the other (n_column x n_unknown); then replace each column b by K^-1 b.
+ * Unknowns are those of emcon_set_map; without a map the freedoms of all nodes, of which those that
+ * are held come out as 0. Return 0, or any other value, with which the step fails. The function must
+ * not call the library with the same model. */
+typedef int (*emcon_solve_function)(void *user, int n_freedom, const double *du,
+                                    const emcon_csr *second, int n_unknown, int n_column,
+                                    double *columns);
+
+/* A whole step from the displacements u0: emcon_begin_contact, then Newton's method with all
+ * candidates (emcon_select_candidates, emcon_solve_contacts), until emcon_update_active is done.
+ * `du`: the expected motion, on return that of the step; `stop`: that of emcon_begin_friction, in
+ * dynamic steps with friction; `h`: the size of the step if pairs have damping, else 0. `active`: 1
+ * for constraints that acted at the end of the step before, on return for those that act now;
+ * `lam`: the forces of their gaps, 0 where open. After a failure `du` and `active` are what they
+ * were; EMCON_ERROR_ANALYSIS: try a smaller step. */
+int emcon_solve_step(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                     double *du /* n_node x n_dim, in and out */,
+                     const double *stop /* n_node x n_dim, or NULL */, double h, int n_constraint,
+                     int *active /* n_constraint, in and out */, double *lam /* n_constraint */,
+                     emcon_solve_function solve, void *user);
 
 /* Leave selected constraints out for the rest of the step; `active`: those that remain. */
 int emcon_drop(emcon_model *model, int n_redundant, const int *redundant /* n_redundant */,

@@ -368,10 +368,11 @@ public:
    // A step from the displacements `u0`, solved with all candidates until none is missing. Before,
    // `du` is the expected motion, and `active` has the flags of the step before (empty: nothing acted);
    // after it, those of this one. `newton(du, n)` solves with the n rows that are selected: it changes
-   // du, and returns their multipliers. `stop` is that of emcon_begin_friction; empty: none.
+   // du, and returns their multipliers. `stop` is that of emcon_begin_friction; empty: none. `h`, if
+   // pairs have damping: the size of the step.
    template <class Newton>
    void solve_step(const std::vector<double> &u0, std::vector<double> &du, std::vector<int> &active,
-                   const std::vector<double> &stop, Newton newton)
+                   const std::vector<double> &stop, Newton newton, double h = 0)
    {
       const int n_node = sizes().n_node, m = sizes().n_constraint;
       if (active.empty()) active.resize(static_cast<std::size_t>(m));
@@ -381,6 +382,7 @@ public:
       int n = 0, is_done = 0, outcome = EMCON_STEP_DONE;
       call(emcon_begin_contact, n_node, u0.data(), du.data(), m, active.data(), active.data());
       if (!stop.empty()) call(emcon_begin_friction, n_node, stop.data());
+      if (!(h <= 0 && h >= 0)) call(emcon_begin_damping, h);
       while (!is_done) {
          call(emcon_select_candidates, n_node, u0.data(), du.data(), m, active.data(), &n);
          const std::vector<double> lam = newton(du, n);

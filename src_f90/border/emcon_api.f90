@@ -43,9 +43,11 @@
 !> **Contact and ties for a program that has its own solids.** In place of a deck: `stepper_new`,
 !> `stepper_add_surface`, in space `stepper_add_faces`, `stepper_add_pair` (options:
 !> `contact_options_t`), `stepper_add_tie`, `stepper_hold`, `stepper_set_contact`, then
-!> `stepper_build`. In each step `query_begin_contact`; then, until `query_update_active` is done,
-!> `query_select` or `query_choose`, and Newton's method on `query_contact`, `query_curvature`, with
-!> the multipliers or with `query_null_space`, `query_particular`, `query_multipliers`. Pressures
+!> `stepper_build`. `query_solve_step` makes a whole step with the solver of the program, a type
+!> that extends `host_solver_t`. Or call one by one: `query_begin_contact`; then, until
+!> `query_update_active` is done, `query_select` or `query_choose`, and Newton's method on
+!> `query_contact`, `query_curvature`, with the multipliers or with `query_null_space`,
+!> `query_particular`, `query_multipliers`. Pressures
 !> are multipliers over `query_areas`; `query_overlap` judges the step by geometry alone. Friction
 !> is that of `interaction_t`, given with the pair; in dynamic steps `query_begin_friction` brings
 !> velocities along surfaces to rest, and `query_slips` tells what slides. For friction of any size
@@ -114,6 +116,7 @@ module emcon_api
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature, &
       query_curvature_times, query_pattern, query_set_map
+   use emcon_stepper_solve, only : host_solver_t, query_solve_step
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
       load_pressure
    use emcon_text, only : string_t

@@ -152,14 +152,14 @@ def hosts(bare: Bare, prefix: Path | None) -> None:
              "apt-get install -qy --no-install-recommends cmake g++ make")
     bare.run("host of the wheel", "cmake -S host -B of_wheel -Demcon_DIR=$(python -c "
              "'import emcon; print(emcon.get_cmake_dir())') && cmake --build of_wheel && "
-             "of_wheel/host input_decks/ring.inp")
+             "of_wheel/border input_decks/ring.inp && of_wheel/blocks mortar 0.3 12")
     if not prefix:
         return
     shutil.copytree(prefix, bare.folder/"trial"/"a prefix", symlinks=True)
     bare.run("libraries of the prefix",
              f"apt-get install -qy --no-install-recommends {' '.join(LIBRARIES)}")
     bare.run("host of a prefix", "cmake -S host -B of_prefix -DCMAKE_PREFIX_PATH='/trial/a prefix'"
-             " && cmake --build of_prefix --target host && of_prefix/host input_decks/ring.inp")
+             " && cmake --build of_prefix --target border && of_prefix/border input_decks/ring.inp")
 
 
 def tried(bare: Bare, trial: Callable[[Bare], object]) -> list[str]:

@@ -121,6 +121,7 @@ static void without_model(void)
    TELL(emcon_choose(m, 1, x, x, 1, i, x));
    TELL(emcon_select_candidates(m, 1, x, x, 1, i, i));
    TELL(emcon_solve_contacts(m, 1, x, x, x));
+   TELL(emcon_solve_step(m, 1, x, x, x, 0, 1, i, x, NULL, NULL));
    TELL(emcon_evaluate_contact(m, 1, x, x, &report));
    TELL(emcon_update_active(m, 1, x, x, 1, x, x, 1, i, i, i));
    TELL(emcon_drop(m, 1, i, 1, i));

@@ -171,6 +171,49 @@ static void condense(double *u0, double *du, int m, const int *active)
    free(lam);
 }
 
+/* Equations without forces, K = 1, by the unknowns of the links: nothing moves. Reads and writes all. */
+static int stay(void *user, int n_freedom, const double *du, const emcon_csr *second, int n_unknown,
+                int n_column, double *columns)
+{
+   for (int i = 0; i < n_freedom; ++i) *(double *)user += du[i];
+   for (int i = 0; i < second->row_start[n_unknown]; ++i) *(double *)user += second->value[i];
+   for (int i = 0; i < n_column*n_unknown; ++i) columns[i] *= 1;
+   return second->n_row != n_unknown || second->n_column != n_unknown || n_freedom != 2*n_node;
+}
+
+static int fail(void *user, int n_freedom, const double *du, const emcon_csr *second, int n_unknown,
+                int n_column, double *columns)
+{
+   (void)user, (void)n_freedom, (void)du, (void)second, (void)n_unknown, (void)n_column, (void)columns;
+   return 1;
+}
+
+static void solve_at_once(const emcon_sizes *sizes)
+{
+   const int m = sizes->n_constraint;
+   double *u0 = numbers(2*n_node), *du = numbers(2*n_node), *lam = numbers(m), sum = 0;
+   int *active = integers(m, 0);
+   emcon_csr links;
+
+   REFUSED(emcon_solve_step(face, n_node, u0, du, NULL, 0, m, active, lam, stay, &sum));    /* tied */
+   WORKS(emcon_links(face, &links));
+   WORKS(emcon_set_map(face, &links));
+   WORKS(emcon_solve_step(face, n_node, u0, du, NULL, 0, m, active, lam, stay, &sum));
+   WORKS(emcon_solve_step(face, n_node, u0, du, u0, 0.1, m, active, NULL, stay, &sum));
+   need(!sum, "emcon_solve_step", "something has moved");
+   need(emcon_solve_step(face, n_node, u0, du, u0, 0, m, active, lam, fail, NULL) == EMCON_ERROR_ANALYSIS,
+        "emcon_solve_step", "a function that fails");
+   REFUSED(emcon_solve_step(face, n_node, u0, du, u0, 0, m, active, lam, NULL, NULL));
+   REFUSED(emcon_solve_step(face, n_node, u0, NULL, u0, 0, m, active, lam, stay, &sum));
+   REFUSED(emcon_solve_step(face, n_node, u0, du, u0, -1, m, active, lam, stay, &sum));
+   REFUSED_ALL(k, emcon_solve_step(face, k, u0, du, u0, 0, m, active, lam, stay, &sum));
+   REFUSED_ALL(k, emcon_solve_step(face, n_node, u0, du, u0, 0, k, active, lam, stay, &sum));
+   free(u0);
+   free(du);
+   free(lam);
+   free(active);
+}
+
 static void step(int has_friction)
 {
    emcon_sizes sizes;
@@ -212,6 +255,7 @@ static void step(int has_friction)
    REFUSED(emcon_drop(face, INT_MAX, NULL, m, active));
    WORKS(emcon_drop(face, 1, node, m, active));
    need(active[n_row] == 1 && active[m - 1] == 0, "emcon_drop", "another one is left");
+   solve_at_once(&sizes);
    free(u0);
    free(du);
    free(active);

@@ -8,14 +8,14 @@ import re
 import shlex
 import shutil
 import subprocess
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from embed_tools import HERE, ROOT, SANITIZED, need, run
+from landing_block import landing
 
-from emcon import Model, Stepper
+from emcon import Stepper
 
 RING = ROOT/"input_decks"/"ring.inp"
 PROGRAM = ROOT/"build"/os.environ.get("MODE", "release")/"emcon"
@@ -40,14 +40,14 @@ def configure(prefix: Path, folder: Path, *more: str) -> subprocess.CompletedPro
                           capture_output=True, text=True)
 
 
-def test_a_host_in_cpp_by_cmake(prefix: Path, tmp_path: Path) -> None:
+def test_the_border_of_cpp_by_cmake(prefix: Path, tmp_path: Path) -> None:
     """Shared, and with the library in it: the same digits, without a path to be set."""
     done = configure(prefix, tmp_path)
     assert done.returncode == 0, done.stderr
     run("cmake", "--build", tmp_path)
-    shared, static = (run(tmp_path/name, RING, env=PLAIN) for name in ("host", "host_static"))
+    shared, static = (run(tmp_path/name, RING, env=PLAIN) for name in ("border", "border_static"))
     assert shared == static and len(shared.split()) == 2
-    assert "libemcon" not in run("ldd", tmp_path/"host_static")
+    assert "libemcon" not in run("ldd", tmp_path/"border_static")
 
 
 @pytest.fixture(scope="module")
@@ -57,27 +57,6 @@ def blocks(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stderr
     run("cmake", "--build", folder, "--target", "blocks")
     return folder/"blocks"
-
-
-def landing(kind: str, friction: float) -> Model:
-    """The scene of blocks.cpp with linear elements of the library."""
-    n, size, lame = 3, [1/3, 1/3, 0.4], (60.0, 40.0)
-    plate = [(x, y, z) for z in (-1, 0) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))]
-    x = np.array(list(product(range(n + 1), range(n + 1), range(2))))*size - [0.5, 0.5, -0.02]
-    corners = [(a, b, k) for k in range(2) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
-    cells = [[8 + ((i + a)*(n + 1) + j + b)*2 + k for a, b, k in corners] for i, j in product(range(n), repeat=2)]
-    model = Model.from_arrays(np.concatenate([plate, x]), {"C3D8": [list(range(8)), *cells]})
-    lam, mu = lame
-    model.material("M", density=1.0, elastic=(mu*(3*lam + 2*mu)/(lam + mu), lam/(2*(lam + mu)))).section("M")
-    model.surface("PLATE", faces=[(0, 2)])
-    model.surface("SOLE", faces=[(k, 1) for k in range(1, 10)])
-    model.interaction("I", **({"friction": friction} if friction else {}))
-    model.contact_pair("SOLE", "PLATE", interaction="I", edges="NO", guard="NO", sides="ONE", type=kind)
-    model.boundary(list(range(8)), [1, 2, 3])
-    for k, place in enumerate(x, 8):
-        model.initial("VELOCITY", [k], [1, 2, 3], [0.8, 0.3 + 0.4*place[0], -0.5 + 0.2*place[1]])
-    model.step("DYNAMIC", h=0.02, duration=0.24, nlgeom=False, direct=True)
-    return model
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3, 0.8])

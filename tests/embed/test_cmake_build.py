@@ -82,7 +82,7 @@ def test_the_build_gives_the_same_bits(tmp_path: Path) -> None:
     assert tables[0] == tables[1] and len(tables[0]) > 1
     run("cmake", "-S", HERE/"cmake", "-B", tmp_path/"host", f"-DCMAKE_PREFIX_PATH={prefix}")
     run("cmake", "--build", tmp_path/"host")
-    for arguments, names in (([ROOT/"input_decks"/"ring.inp"], ("host", "host_static")), (["mortar", "0.3", "6"], ("blocks",))):
+    for arguments, names in (([ROOT/"input_decks"/"ring.inp"], ("border", "border_static")), (["mortar", "0.3", "6"], ("blocks",))):
         found = {run(folder/name, *arguments) for name in names for folder in (whole, tmp_path/"host")}
         assert len(found) == 1 and len(found.pop().split()) >= 2
 

@@ -113,11 +113,28 @@ def test_contact_for_a_program_with_its_own_solids(
         assert max(misfit, crossed) <= 100*EPS
 
 
+@pytest.fixture(scope="module")
+def bars(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("bars")/"fortran_bars"
+    build("gfortran", HERE/"fortran_bars.f90", program, installed, "-std=f2018")
+    return program
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("formulation", [1, 2, 3])
+def test_a_host_in_fortran_keeps_energy_and_momentum(bars: Path, formulation: int, friction: float, installed: dict[str, str]) -> None:
+    """Two free trusses collide, by one call a step."""
+    drift, lost, *momentum = map(float, run(bars, env=installed, input=f"{formulation} {friction}\n").split())
+    # 400 steps, each with a few roundings of the energy, and of momenta whose parts are velocities of size 1 over steps.
+    assert drift <= 400*EPS and (lost > 0.05) == (friction > 0)
+    assert momentum == pytest.approx([1.5, -6.0], abs=6*400*EPS)
+
+
 @pytest.mark.parametrize(("friction", "velocity"), [(0.0, 1.0), (0.3, 0.4), (0.8, 0.0)])
 def test_friction_by_sets_and_with_all_candidates(friction: float, velocity: float, installed: dict[str, str], tmp_path: Path) -> None:
     """Of the velocity along the floor friction takes twice its coefficient, or all; the energy is in what is left and lost."""
-    program = tmp_path/"fortran_rub"
-    build("gfortran", HERE/"fortran_rub.f90", program, installed, "-std=f2008")
+    program = tmp_path/"friction_loop"
+    build("gfortran", HERE/"friction_loop.f90", program, installed, "-std=f2008")
     lines = run(program, friction, env=installed).splitlines()
     assert len(lines) == 2
     for line in lines:

@@ -351,7 +351,7 @@ def test_a_host_in_cpp_by_the_files_of_a_wheel(wheel: Path, tmp_path: Path) -> N
                           capture_output=True, text=True, check=True).stdout.splitlines()
     run("cmake", "-S", ROOT/"tests"/"embed"/"cmake", "-B", tmp_path/"host", f"-Demcon_DIR={told[0]}")
     run("cmake", "--build", tmp_path/"host")
-    assert len(run(tmp_path/"host"/"host", RING).split()) == 2
+    assert len(run(tmp_path/"host"/"border", RING).split()) == 2
     run("cc", ROOT/"tests"/"embed"/"impact.c", f"-I{told[1]}", told[2], "-o", tmp_path/"impact",
         f"-Wl,-rpath,{Path(told[2]).parent}")
     assert run(tmp_path/"impact", RING, "h=0.05\nt_end=0.1").startswith("1 ")

@@ -31,7 +31,8 @@ RUNS = [
     ("query.c", DECKS/"bouncing_bar.inp"),
     ("bad_calls.c", DECKS/"bouncing_bar.inp", "{}"),
     # the impact is over after 100 steps
-    ("interface_bars.c", "100"),
+    ("contact_loop.c", "100"),
+    ("interface_bars.c", "3", "100"),
     ("wrong_contact.c",),
     ("host_solid.c", "MORTAR", "0.05"),
     ("bad_given.c", "{}/given.h5"),

@@ -9,8 +9,8 @@ import pytest
 from python_doc import OUTPUTS, PAGES, RUNS, blocks, examples, is_near, pictures, run_chapter
 
 TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
-#: Languages of other blocks, which `test_cmake`, `test_host_solid` and `test_interface_c` compile.
-COMPILED = {"embedding": {"", "cmake", "c", "cpp", "fortran"}}
+#: Languages of other blocks, which `test_cmake`, `test_host_solid`, `test_interface_c`, `test_hosts_page` compile.
+COMPILED = {"embedding": {"", "cmake", "c", "cpp", "fortran"}, "hosts": {"cpp", "text compiled"}}
 #: Their runs take seconds.
 LONG = {"7 Studies", "11 Cost and error of settings"}
 CHAPTERS = [pytest.param(path, title, id=f"{path.stem}-{title}", marks=[pytest.mark.long]*(title in LONG))

@@ -92,6 +92,7 @@ program main
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
    use test_host_contact, only : collect_host_contact
+   use test_host_step, only : collect_host_step
    use test_initial_contact, only : collect_initial_contact
    use test_interface, only : collect_interface
    use test_interlock, only : collect_interlock
@@ -324,6 +325,7 @@ program main
    call run("nts_stencil", collect_nts_stencil)
    call run("nts", collect_nts)
    call run("interface", collect_interface)
+   call run("host_step", collect_host_step)
    call run("interlock", collect_interlock)
    call run("joints", collect_joints)
    call run("host_check", collect_host_check)

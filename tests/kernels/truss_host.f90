@@ -1,4 +1,4 @@
-!> A host code in small: point masses and bars, a dense Newton step in the null space of contact.
+!> Point masses and bars for the tests of hosts, with a dense Newton step in the null space of contact.
 !>
 !> The strain of a bar, (l^2 - L^2)/(2 L^2), is quadratic in the positions, so the mean of its
 !> values at both ends of a step, with the direction at the middle, is a discrete gradient of
@@ -20,7 +20,7 @@ module truss_host
    implicit none
    private
    public :: face_t, face_new, face_build, face_n
-   public :: truss_t, truss_begin, truss_add, truss_step, truss_energy, truss_momentum
+   public :: truss_t, truss_begin, truss_add, truss_respond, truss_step, truss_energy, truss_momentum
 
    !> A model of the host's nodes, and what it is asked.
    type :: face_t
@@ -143,7 +143,7 @@ contains
    end function strain
 
    !> Residual of the step without contact, its tangent, and the sizes of what it consists of.
-   pure subroutine respond(self, h, du, residual, tangent, magnitude)
+   pure subroutine truss_respond(self, h, du, residual, tangent, magnitude)
       type(truss_t), intent(in) :: self
       real(wp), intent(in) :: h
       real(wp), intent(in) :: du(:, :)
@@ -179,7 +179,7 @@ contains
             tangent(dof(3:), dof(:2)) = tangent(dof(3:), dof(:2)) - block
          end associate
       end do
-   end subroutine respond
+   end subroutine truss_respond
 
    !> One energy-momentum step of size `h`; the active set and contact are the library's.
    subroutine truss_step(self, face, h, error)
@@ -241,7 +241,7 @@ contains
 
       last = huge(last)
       do iteration = 1, most_iterations
-         call respond(self, h, du, residual, tangent, magnitude)
+         call truss_respond(self, h, du, residual, tangent, magnitude)
          call query_contact(face%query, face%stepper, self%u, du, values, error)
          if (allocated(error)) return
          call query_null_space(face%query, p, df, redundant, error)

@@ -21,7 +21,7 @@ TESTS = [sys.executable, "-m", "pytest", "-q"]
 SOAK = [sys.executable, ROOT / "tests/soak/soak.py", "--seed=1"]
 EMBED = ROOT / "tests" / "embed"
 #: What is compiled and linked with the library there; Python cannot load it with a sanitizer in it.
-PROGRAMS = ["c", "c_query", "fortran", "host_driver", "host_solid", "interface_c", "memory",
+PROGRAMS = ["c", "c_query", "fortran", "fortran_77", "host_solid", "interface_c", "memory",
             "threads"]  # fmt: skip
 PARTS = {
     "kernels": [BUILD / "kernels"],

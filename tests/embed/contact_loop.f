@@ -1,21 +1,12 @@
-C     An old code that takes contact from EMCON.
-C
-C     The code computes plane trusses of point masses and bars, keeps
-C     everything in common blocks, and solves its equations by Gaussian
-C     elimination. Here a truss of 2 cells falls on one of 4 cells,
-C     which is clamped at its lower row.
-C
-C     What has been added for contact is marked by C-EM.
+C     All calls of a step of contact one by one, in the manner of Fortran 77
+C     (an example by one call is host_77.f): plane trusses of point masses
+C     and bars in common blocks, multipliers as unknowns of a Gaussian
+C     elimination. A truss of 2 cells falls on one of 4 cells, which is
+C     clamped at its lower row. Calls are marked by C-EM.
 C
 C     It prints, for each of the three contact formulations:
 C     steps, steps in contact, relative drift of the energy, smallest
 C     gap, vertical velocity of the falling truss before and after.
-C
-C     Build, in one line, with the folder of the library in $LIB and that
-C     of its header in $INCLUDE; fortran_77.c, over the functions of C,
-C     has the subroutines EMNEW and so on:
-C        gfortran -std=legacy host_driver.f -I$INCLUDE fortran_77.c
-C           -L$LIB -lemcon -Wl,-rpath,$LIB -o host_driver
 C
       PROGRAM HOST
       IMPLICIT DOUBLE PRECISION (A-H,O-Z)
@@ -103,7 +94,7 @@ C
       DATA LOWER /10,9, 9,8, 8,7, 7,6/
       DATA IUPPER /11,12, 12,13/
       DATA IOPT /5*0/, ANGLE /2*0.D0/
-      CALL EMNEW(IH, NNODE, X, IERR)
+      CALL EMNEW(IH, 2, NNODE, X, IERR)
       CALL CHECK(IERR)
       CALL EMSURF(IH, 4, LOWER, MASTER, IERR)
       CALL CHECK(IERR)

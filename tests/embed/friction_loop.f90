@@ -1,9 +1,9 @@
-!> Two point masses fly askew at a floor, hit it one after the other and rub on it: friction through the
-!> calls of Fortran, with a map to the unknowns of the masses, by sets of contacts or with all candidates.
-!> The host computes inertia; its matrix K is diagonal, 2 m/h^2.
+!> All calls of a step with friction one by one (an example by one call is fortran_bars.f90): two point
+!> masses fly askew at a floor, hit it one after the other and rub on it, with a map to the unknowns of the
+!> masses, by sets of contacts and with all candidates. The host's matrix K is diagonal, 2 m/h^2.
 !>
-!> usage: fortran_rub FRICTION
-program fortran_rub
+!> usage: friction_loop FRICTION
+program friction_loop
    use emcon_api, only : contact_options_t, contact_report_t, csr_from_values, csr_multiply, csr_t, error_t, &
       formulation_nts, interaction_t, query_begin_contact, query_begin_friction, query_contact, query_free, query_pattern, &
       query_select, query_select_candidates, query_set_map, query_slips, query_solve_contacts, query_t, query_update_active, &
@@ -176,4 +176,4 @@ contains
       y = [(y(i)/rest(i, i), i = 1, size(b))]
    end function solved
 
-end program fortran_rub
+end program friction_loop

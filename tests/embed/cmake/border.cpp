@@ -1,6 +1,7 @@
-// The ring impact by emcon.hpp: run, states kept, conditions changed, functions given, failures.
+// A test of what emcon.hpp does: runs of the ring impact, states kept, functions given, calls of hosts,
+// failures and exceptions. An example of a host is blocks.cpp.
 //
-// usage: host DECK
+// usage: border DECK
 #include <emcon.hpp>
 
 #include <cmath>
@@ -191,6 +192,49 @@ void land_on_a_floor()
    refused("active has 3 flags, but there are 2", [&] { face.solve_step(u, du, active, {}, face.newton(u, towards)); });
 }
 
+// Two masses with damping between them and the floor: it takes what is missing from the energy.
+void bounce_with_damping()
+{
+   const double h = 0.02;
+   emcon::Model face = emcon::Model::of_nodes({-1, 0, 1, 0, -0.3, 0.1, 0.3, 0.1});
+   const int floor = face.add_faces("floor", 2, {1, 0}), sole = face.add_faces("sole", 2, {2, 3});
+   emcon_pair_options damped = emcon_pair_options();
+   damped.damping = 2;
+   damped.damping_clearance = 0.05;
+   face.call(emcon_add_pair, sole, floor, static_cast<int>(EMCON_NODE_TO_SEGMENT), &damped);
+   face.hold({0, 1});
+   face.build();
+   face.set_free_unknowns();
+   std::vector<double> u(8), v{0, 0, 0, 0, 0, -1, 0, -1}, du, push(8);
+   std::vector<int> active;
+   double taken = 0, part = 0;
+   auto solve = [&](const std::vector<double> &at, const emcon_csr &second, int n, double *columns) {
+      std::vector<double> k(4, 2/(h*h));     // the floor is straight: nothing couples the masses
+      emcon::each(second, [&](std::size_t i, std::size_t j, double value) {
+         require(i == j || value == 0, "damping along the normal");
+         if (i == j) k[i] -= value;
+      });
+      for (int i = 0; i < 4; ++i) columns[4*(n - 1) + i] += 2/h*(at[4 + i]/h - v[4 + i]);
+      for (int i = 0; i < 4*n; ++i) columns[i] /= k[i%4];
+   };
+   for (int step = 0; step < 20; ++step) {
+      du = v;
+      for (double &motion : du) motion *= h;
+      if (step == 4) refused("the size of the step is to be told",
+                             [&] { face.solve_step(u, du, active, {}, face.newton(u, solve)); });
+      face.solve_step(u, du, active, {}, face.newton(u, solve), h);
+      face.call(emcon_law_forces, 4, push.data(), &part);
+      taken += part;
+      for (int i = 0; i < 8; ++i) {
+         u[i] += du[i];
+         v[i] = 2/h*du[i] - v[i];
+      }
+   }
+   double energy = 0;
+   for (double part_of : v) energy += 0.5*part_of*part_of;
+   require(v[5] > 0 && taken > 0.01 && std::abs(energy + taken - 1) < 1e-13, "energy and damping");
+}
+
 }  // namespace
 
 int main(int argc, char **argv)
@@ -202,5 +246,6 @@ int main(int argc, char **argv)
    stop_by_exceptions(argv[1]);
    give_a_spring();
    land_on_a_floor();
+   bounce_with_damping();
    return 0;
 }
