@@ -141,7 +141,8 @@ contains
       self%least_soft = min(level, 1)
    end subroutine solve_condensed
 
-   !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
+   !> In statics contacts may be all that holds a body: they are held as a tangent is factorised. A
+   !> factor that is kept is without them.
    pure subroutine find_hold(self, system, set)
       type(contact_newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -152,7 +153,7 @@ contains
          do k = 1, size(problem%stiffness)
             problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
          end do
-         if (.not. self%holds) return
+         if (.not. self%holds .or. self%by_kept) return
          do k = first + 1, set%n_row
             self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
          end do
