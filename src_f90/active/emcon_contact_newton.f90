@@ -9,7 +9,8 @@ module emcon_contact_newton
    use emcon_condensation, only : condensation_free
    use emcon_constraint, only : condition_rate, most_slips
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_normals, &
+      constraints_take_hold
    use emcon_contact_newton_condense, only : contact_newton_condense, &
       contact_newton_condense_kept, contact_newton_correct
    use emcon_contact_newton_type, only : contact_newton_t, rest_t
@@ -65,8 +66,8 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
-      integer :: k
       logical :: is_static
+      integer :: k
 
       call begin(self, newton, set)
       is_static = evaluation_is_equilibrium(motion%evaluation)
@@ -222,8 +223,8 @@ contains
       type(newton_t), intent(in) :: newton
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
-
       logical, intent(in) :: is_static           !! nothing has inertia
+
       may_keep = ((self%turns .and. .not. is_static) .or. set%n_row >= many) &
          .and. factor_policy_may_provide(newton%factor_policy) &
          .and. .not. (self%holds .or. self%has_tangent .or. any(abs(newton%driven) > 0.0_wp))
@@ -367,6 +368,7 @@ contains
       call constraints_take_hold(set)
       self%rest%has_second = .not. (self%is_searching .or. self%by_kept)
       call constraints_evaluate(set, system, motion, .not. self%rest%has_second)
+      call follow_normals(self, set)
       call constraints_rows(set, system%space%numbering)
       call phase_leave(system%phases, left)
       call newton_pick_residual(newton, system, set)
@@ -457,7 +459,7 @@ contains
 
    !> Go a part of the way to what the condensed step has as its solution.
    subroutine take(self, newton, system, set, motion, part)
-      type(contact_newton_t), intent(in) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(in) :: newton
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -466,6 +468,20 @@ contains
 
       call add_to_dofs(system%space%numbering, newton%dq, part, motion%du)
       set%lam = self%step%old + part*(self%step%new - self%step%old)
+      self%step%is_taken = .true.
    end subroutine take
+
+   !> Friction is in proportion to the normal force where the motion has come to.
+   subroutine follow_normals(self, set)
+      type(contact_newton_t), intent(inout) :: self
+      type(constraint_set_t), intent(inout) :: set   !! evaluated there
+
+      if (.not. self%step%is_taken) return
+      self%step%is_taken = .false.
+      associate (now => constraints_normals(set))
+         where (min(now, self%step%normal) > 0.0_wp) set%lam = set%lam*(now/self%step%normal)
+      end associate
+      call constraints_take_hold(set)
+   end subroutine follow_normals
 
 end module emcon_contact_newton

@@ -5,7 +5,7 @@
 module emcon_contact_newton_condense
    use emcon_condensation, only : condensation_make, condensation_move, condensation_renew, &
       condensation_take
-   use emcon_constraints, only : constraint_set_t
+   use emcon_constraints, only : constraint_set_t, constraints_normals
    use emcon_contact_newton_type, only : contact_newton_t
    use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_force, &
@@ -223,6 +223,7 @@ contains
       integer :: k
 
       self%step%old = set%lam
+      self%step%normal = constraints_normals(set)
       force = contact_problem_force(self%problem, self%push)
       associate (first => set%n_permanent)
          do k = first + 1, set%n_row
