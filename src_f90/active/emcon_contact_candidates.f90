@@ -259,7 +259,7 @@ contains
       call phase_leave(system%phases, left)
       if (status /= step_done) return
       if (self%is_stale) then
-         call active_set_note_stale(self, status)
+         if (obeys) call active_set_note_stale(self, status)
          self%candidates%have_changed = .true.
       else if (self%friction%lags .and. .not. self%candidates%have_changed) then
          if (friction_waits(self%friction, obeys .and. .not. self%candidates%one_closes)) return

@@ -9,7 +9,8 @@ module emcon_contact_newton
    use emcon_condensation, only : condensation_free
    use emcon_constraint, only : condition_rate, most_slips
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_normals, &
+      constraints_take_hold
    use emcon_contact_newton_condense, only : contact_newton_condense, &
       contact_newton_condense_kept, contact_newton_correct
    use emcon_contact_newton_type, only : contact_newton_t, rest_t
@@ -43,9 +44,7 @@ module emcon_contact_newton
    integer, parameter :: most_parts = 4
    real(wp), parameter :: enough = 0.9_wp, no_search = 1.0e-7_wp
    !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
-   !> solution for each row; where slip has a direction of any number. And in statics they are stiff
-   !> only where nothing else holds a body: without that, pushes are found of rows that follow from
-   !> others.
+   !> solution for each row; where slip has a direction of any number, but for statics.
    integer, parameter :: many = 100
    !> The tangent of an iterate does for the next one if that leaves less than this part; a factor
    !> that is kept does with new rows if less than that is left.
@@ -67,11 +66,15 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_static
       integer :: k
 
       call begin(self, newton, set)
-      self%holds = self%holds .or. (evaluation_is_equilibrium(motion%evaluation) &
-         .and. set%n_row < many)
+      is_static = evaluation_is_equilibrium(motion%evaluation)
+      if (.not. self%early%goes_on) self%by_kept = may_keep(self, newton, system, set, is_static)
+      ! A belt that contact presses on a drum has no stiffness worth speaking of without contact,
+      ! or less than none: its tangent has that of the rows.
+      self%holds = self%holds .or. is_static
       call iterate(self, newton, system, set, motion, status, error)
       if (allocated(error)) return
       do k = 1, size(self%law)
@@ -175,7 +178,6 @@ contains
 
       most_iterates = more_iterates*newton%convergence%maximum
       self%is_driven = any(abs(newton%driven) > 0.0_wp)
-      if (.not. self%early%goes_on) self%by_kept = may_keep(self, newton, system, set)
       if (self%is_driven) motion%du = motion%du - newton%driven
       do i = 0, most_iterates
          call newton_check_interrupt(newton, status, error)
@@ -214,16 +216,18 @@ contains
       end do
    end subroutine iterate
 
-   !> May corrections come from a factor that is kept?
-   pure logical function may_keep(self, newton, system, set)
-      type(contact_newton_t), intent(in) :: self
+   !> May corrections come from a factor that is kept? It knows nothing of contacts that alone hold
+   !> a body.
+   pure logical function may_keep(self, newton, system, set, is_static)
+      type(contact_newton_t), intent(in) :: self         !! begun
       type(newton_t), intent(in) :: newton
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
+      logical, intent(in) :: is_static           !! nothing has inertia
 
-      may_keep = (self%turns .or. set%n_row >= many) &
+      may_keep = ((self%turns .and. .not. is_static) .or. set%n_row >= many) &
          .and. factor_policy_may_provide(newton%factor_policy) &
-         .and. .not. (self%holds .or. self%is_driven .or. self%has_tangent)
+         .and. .not. (self%holds .or. self%has_tangent .or. any(abs(newton%driven) > 0.0_wp))
       if (may_keep) may_keep = kept_factor_has_room(newton%correction%kept, set%n_row, &
          size(system%matrix%column))
    end function may_keep
@@ -364,6 +368,7 @@ contains
       call constraints_take_hold(set)
       self%rest%has_second = .not. (self%is_searching .or. self%by_kept)
       call constraints_evaluate(set, system, motion, .not. self%rest%has_second)
+      call follow_normals(self, set)
       call constraints_rows(set, system%space%numbering)
       call phase_leave(system%phases, left)
       call newton_pick_residual(newton, system, set)
@@ -454,7 +459,7 @@ contains
 
    !> Go a part of the way to what the condensed step has as its solution.
    subroutine take(self, newton, system, set, motion, part)
-      type(contact_newton_t), intent(in) :: self
+      type(contact_newton_t), intent(inout) :: self
       type(newton_t), intent(in) :: newton
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
@@ -463,6 +468,20 @@ contains
 
       call add_to_dofs(system%space%numbering, newton%dq, part, motion%du)
       set%lam = self%step%old + part*(self%step%new - self%step%old)
+      self%step%is_taken = .true.
    end subroutine take
+
+   !> Friction is in proportion to the normal force where the motion has come to.
+   subroutine follow_normals(self, set)
+      type(contact_newton_t), intent(inout) :: self
+      type(constraint_set_t), intent(inout) :: set   !! evaluated there
+
+      if (.not. self%step%is_taken) return
+      self%step%is_taken = .false.
+      associate (now => constraints_normals(set))
+         where (min(now, self%step%normal) > 0.0_wp) set%lam = set%lam*(now/self%step%normal)
+      end associate
+      call constraints_take_hold(set)
+   end subroutine follow_normals
 
 end module emcon_contact_newton

@@ -5,7 +5,7 @@
 module emcon_contact_newton_condense
    use emcon_condensation, only : condensation_make, condensation_move, condensation_renew, &
       condensation_take
-   use emcon_constraints, only : constraint_set_t
+   use emcon_constraints, only : constraint_set_t, constraints_normals
    use emcon_contact_newton_type, only : contact_newton_t
    use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_force, &
@@ -141,7 +141,8 @@ contains
       self%least_soft = min(level, 1)
    end subroutine solve_condensed
 
-   !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
+   !> In statics contacts may be all that holds a body: they are held as a tangent is factorised. A
+   !> factor that is kept is without them.
    pure subroutine find_hold(self, system, set)
       type(contact_newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -152,7 +153,7 @@ contains
          do k = 1, size(problem%stiffness)
             problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
          end do
-         if (.not. self%holds) return
+         if (.not. self%holds .or. self%by_kept) return
          do k = first + 1, set%n_row
             self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
          end do
@@ -222,6 +223,7 @@ contains
       integer :: k
 
       self%step%old = set%lam
+      self%step%normal = constraints_normals(set)
       force = contact_problem_force(self%problem, self%push)
       associate (first => set%n_permanent)
          do k = first + 1, set%n_row

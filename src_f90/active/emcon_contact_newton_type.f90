@@ -31,7 +31,7 @@ module emcon_contact_newton_type
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
       type(coulomb_t), allocatable :: law(:)     !! (n) of the contacts; mu = 0: no friction
-      !> Before a solve: contact alone holds a body; in it: rows are stiff in the tangent
+      !> Before a solve: contact alone holds a body; in it: rows are stiff in tangents
       logical :: holds = .false.
       type(early_end_t) :: early
       type(condensation_t) :: condensation

@@ -12,6 +12,10 @@ module emcon_mixed_step
 
    type :: mixed_step_t
       real(wp), allocatable :: old(:), new(:)    !! (n_row) multipliers before and after it
+      !> (n_row) of friction: the normal force by a multiplier of 1 where the step is linearised;
+      !> else 1
+      real(wp), allocatable :: normal(:)
+      logical :: is_taken = .false.      !! a part of it was, and friction has that normal force yet
       logical :: mixes = .false.                 !! the last one was mixed
       type(mixing_t), private :: mixing
       !> (n_unknown + n_row) the last one as it was made, with its multipliers as lengths [L]
@@ -26,8 +30,9 @@ contains
       integer, intent(in) :: n_row               !! of the set
 
       self%mixes = .false.
-      if (allocated(self%old)) deallocate(self%old, self%new)
-      allocate(self%old(n_row), self%new(n_row))
+      self%is_taken = .false.
+      if (allocated(self%old)) deallocate(self%old, self%new, self%normal)
+      allocate(self%old(n_row), self%new(n_row), self%normal(n_row))
    end subroutine mixed_step_begin
 
    !> Mix `dq` and `new` with what was made before.

@@ -89,15 +89,19 @@ contains
 
    !> Slip over a step along two directions in the plane of both edges, the first one along that of
    !> the slave as the step begins: the master goes by as much the other way.
-   pure subroutine edge_pair_slip(at, way, leaves_second, slip)
+   pure subroutine edge_pair_slip(at, way, leaves_second, ends_at_start, slip)
       real(wp), intent(in) :: at(n_dim, n_edge_pair_node)    !! where the ends start [L]
       real(wp), intent(in) :: way(n_dim, n_edge_pair_node)   !! how they move [L]
       logical, intent(in) :: leaves_second       !! no second derivatives
+      logical, intent(in) :: ends_at_start       !! nothing moves: start and end are one place
       type(edge_pair_slip_t), intent(out) :: slip
       type(frame_slip_t) :: over
       integer :: k
 
-      call frame_slip(tips_of(at), tips_of(way), at(:, 2) - at(:, 1), leaves_second, over)
+      call frame_slip(tips_of(at), tips_of(way), at(:, 2) - at(:, 1), leaves_second, &
+         ends_at_start, over)
+      ! The slave's edge is the first vector of the frame.
+      over%h(:, :3, :) = over%h(:, :3, :) + over%by_along
       slip%f = -over%f
       do k = 1, size(over%f)
          call first_to_nodes(-1.0_wp, over%g(:, k), slip%g(:, :, k))

@@ -22,17 +22,21 @@ module emcon_frame_slip_space
       real(wp) :: c(n_frame_var, 2) = 0.0_wp     !! gradients at the end,
       !> and (i, j, which) derivative of g(i, which) by variable j at the end; 0 if not asked for
       real(wp) :: h(n_frame_var, n_frame_var, 2) = 0.0_wp
+      !> Where the step ends as it starts: `h` has what the frame as the step begins turns and
+      !> stretches by, too, half of it as of the rest. This is by components of `along` [1/L]
+      real(wp) :: by_along(n_frame_var, 3, 2) = 0.0_wp
    end type frame_slip_t
 
 contains
 
    !> Slip along two directions in the plane of the frame as the step begins, at right angles: the
    !> first one is as near to `along` as it can be.
-   pure subroutine frame_slip(x, dx, along, leaves_second, slip)
+   pure subroutine frame_slip(x, dx, along, leaves_second, ends_at_start, slip)
       !> Origin, tips of both vectors, point: where they start, how they move [L]
       real(wp), intent(in) :: x(3, 4), dx(3, 4)
       real(wp), intent(in) :: along(3)           !! of any length
       logical, intent(in) :: leaves_second       !! no second derivatives
+      logical, intent(in) :: ends_at_start       !! nothing moves: start and end are one place
       type(frame_slip_t), intent(out) :: slip
       type(frame_vertex_t) :: place
       real(wp) :: a(3), b(3), basis(3, 2), second(n_frame_var, n_frame_var, 3)
@@ -52,7 +56,41 @@ contains
             slip%h(:, :, k) = by_xi*second(:, :, at_xi) + by_eta*second(:, :, at_eta)
          end associate
       end do
+      if (ends_at_start .and. .not. leaves_second) call add_frame(a, b, along, basis, place%g, slip)
    end subroutine frame_slip
+
+   !> What directions and lengths of the frame change gradients by. The first direction stays the
+   !> part of `along` in the plane: both turn in it by the rate `turn`, as the plane tilts and as
+   !> `along` does.
+   pure subroutine add_frame(a, b, along, basis, g, slip)
+      real(wp), intent(in) :: a(3), b(3), along(3)
+      real(wp), intent(in) :: basis(3, 2)        !! the directions
+      real(wp), intent(in) :: g(:, :)            !! (n_frame_var, 3) gradients of places
+      type(frame_slip_t), intent(inout) :: slip
+      real(wp) :: normal(3), axis(3), turn(3, 2), lean, reach
+      integer :: j, k
+
+      normal = cross_product(basis(:, 1), basis(:, 2))
+      axis = tangent_axis(normal, along)
+      lean = dot_product(normal, axis)
+      reach = norm2(axis - lean*normal)
+      associate (area => dot_product(normal, cross_product(a, b)))
+         turn(:, 1) = lean/reach*dot_product(basis(:, 2), cross_product(b, normal))/area*normal
+         turn(:, 2) = lean/reach*dot_product(basis(:, 2), cross_product(normal, a))/area*normal
+      end associate
+      do k = 1, 2
+         associate (other => merge(0.5_wp, -0.5_wp, k == 1)*slip%g(:, 3 - k))
+            do j = 1, 3
+               slip%h(:, j, k) = slip%h(:, j, k) + 0.5_wp*basis(j, k)*g(:, at_xi) &
+                  + turn(j, 1)*other
+               slip%h(:, 3 + j, k) = slip%h(:, 3 + j, k) + 0.5_wp*basis(j, k)*g(:, at_eta) &
+                  + turn(j, 2)*other
+               if (all(abs(axis - along) <= 0.0_wp)) slip%by_along(:, j, k) = &
+                  basis(j, 2)/reach*other
+            end do
+         end associate
+      end do
+   end subroutine add_frame
 
    !> Two directions at right angles to `normal` and to each other, of length 1: the first one as
    !> near to `tangent_axis` as it can be.

@@ -9,8 +9,9 @@ module emcon_mortar_slip_space
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_t
-   use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
-   use emcon_node_sums, only : node_sums_first, node_sums_second
+   use emcon_mortar_slave_space, only : mortar_slave_axis_t, mortar_slave_direction, &
+      mortar_slave_weight
+   use emcon_node_sums, only : node_sums_across, node_sums_first, node_sums_second
    use emcon_patch_look_space, only : patch_cells
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
    implicit none
@@ -300,20 +301,21 @@ contains
          end associate
       end do
       do c = 1, cells%n
-         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, .true., cell)
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, .true., .false., cell)
          slip = slip + cell%f
       end do
    end function mortar_slip_of
 
    !> Add the slip of constraint `i` and its derivatives to its condition, which has all nodes of
    !> it, and room for slip.
-   pure subroutine mortar_slip_add(self, faces, i, slot, sight, along, item)
+   pure subroutine mortar_slip_add(self, faces, i, slot, sight, axis, item)
       type(mortar_slip_t), intent(in) :: self(:) !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       integer, intent(in) :: slot(:)             !! (n_triangle) where each is in `sight`
       type(slip_sight_t), intent(in) :: sight(:) !! what triangles see
-      real(wp), intent(in) :: along(3)           !! of `mortar_slave_direction`
+      !> With weights of the condition's nodes if friction acts by the end of the step alone
+      type(mortar_slave_axis_t), intent(in) :: axis
       type(condition_t), intent(inout) :: item
       type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
@@ -330,21 +332,24 @@ contains
          end associate
       end do
       do c = 1, cells%n
-         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, item%leaves_second, cell)
-         call spread_cell(cell, cells%weight(:, :, c), item)
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), axis%along, item%leaves_second, &
+            allocated(axis%weight), cell)
+         call spread_cell(cell, cells%weight(:, :, c), axis, item)
       end do
    end subroutine mortar_slip_add
 
    !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
    !> are 0, so that of the first node says nothing more.
-   pure subroutine spread_cell(slip, weight, item)
+   pure subroutine spread_cell(slip, weight, axis, item)
       type(frame_slip_t), intent(in) :: slip
       real(wp), intent(in) :: weight(:, :)       !! (3, n_node)
+      type(mortar_slave_axis_t), intent(in) :: axis
       type(condition_t), intent(inout) :: item
       logical :: is_used(size(weight, 2))
       integer :: j, s
 
       is_used = any(abs(weight) > 0.0_wp, 1)
+      if (allocated(axis%weight)) is_used = is_used .or. abs(axis%weight) > 0.0_wp
       is_used(1) = .true.
       associate (place => pack([(j, j = 1, size(is_used))], is_used))
          associate (own => transpose(weight(:, place(2:))))
@@ -352,8 +357,10 @@ contains
                item%slip(s) = item%slip(s) + slip%f(s)
                call node_sums_first(slip%g(:, s), own, 1.0_wp, place, item%t(:, :, s))
                call node_sums_first(slip%c(:, s), own, 1.0_wp, place, item%t1(:, :, s))
-               if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), own, 1.0_wp, &
-                  place, item%ht(:, :, s))
+               if (item%leaves_second) cycle
+               call node_sums_second(slip%h(:, :, s), own, 1.0_wp, place, item%ht(:, :, s))
+               if (allocated(axis%weight)) call node_sums_across(slip%by_along(:, :, s), own, &
+                  axis%weight(place(2:)), 1.0_wp, place, item%ht(:, :, s))
             end do
          end associate
       end associate

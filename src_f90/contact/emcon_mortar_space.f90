@@ -7,7 +7,7 @@ module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
    use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : acts_by_end, gap_state_t, max_penetration_on_entry, push_place
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
@@ -19,7 +19,7 @@ module emcon_mortar_space
    use emcon_mortar_means_space, only : mortar_means_init, mortar_means_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
-   use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
+   use emcon_mortar_slave_space, only : mortar_slave_axis, mortar_slave_weight
    use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
       mortar_slip_shift, mortar_slip_sight, mortar_slip_t
    use emcon_mortar_sum_space, only : mortar_add_facet, mortar_begin_sum, mortar_facet_sums, &
@@ -457,8 +457,8 @@ contains
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
          call mortar_slip_add(self%slide, self%faces, wanted(k), slot, sight%slip, &
-            mortar_slave_direction(self%faces, self%faces%sides%slave%node, wanted(k), x, u0), &
-            item(k))
+            mortar_slave_axis(self%faces, self%faces%sides%slave%node, wanted(k), x, u0, &
+            item(k)%node(:item(k)%n_node), acts_by_end(self%step)), item(k))
       end do
    end subroutine mortar_evaluate
 

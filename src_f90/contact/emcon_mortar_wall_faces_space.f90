@@ -18,7 +18,7 @@ module emcon_mortar_wall_faces_space
    use emcon_wall, only : wall_t
    use emcon_wall_distance_space, only : wall_at, wall_find, wall_spot_t
    use emcon_wall_gap_space, only : wall_gap_nodes
-   use emcon_wall_slip_space, only : n_wall_point
+   use emcon_wall_slip_space, only : n_wall_point, wall_axis_for, wall_own_normal
    implicit none
    private
    public :: wall_faces_t, wall_faces_init, wall_faces_choose, wall_faces_corners, &
@@ -32,6 +32,8 @@ module emcon_mortar_wall_faces_space
       type(facets_t) :: slave
       real(wp), allocatable :: corner(:, :, :)        !! (node of the facet, 3, n_triangle) weights
       logical, allocatable :: is_facing(:)            !! (n_triangle) the wall, in the step
+      !> (n_constraint) vectors of the wall that slip is counted along: as a rule, and in this step
+      integer, allocatable :: usual_axis(:), axis(:)
    end type wall_faces_t
 
 contains
@@ -55,9 +57,24 @@ contains
             call facet_corner_shares(self%slave, self%split, t, self%corner(:, :, t))
          end do
       end associate
+      self%usual_axis = [(wall_axis_for(own_normal(self, t, scene%x, 0.0_wp*scene%x)), &
+         t = 1, size(self%node))]
+      self%axis = self%usual_axis
    end subroutine wall_faces_init
 
-   !> Choose which triangles face the wall at x + u.
+   !> The normal of the wall at the vertex of constraint `i` at x + u, in the vectors of the wall.
+   pure function own_normal(self, i, x, u) result(normal)
+      type(wall_faces_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: normal(3)
+
+      associate (at => wall_at(self%wall, x, u))
+         normal = wall_own_normal(self%wall, at, x(:, self%node(i)) + u(:, self%node(i)))
+      end associate
+   end function own_normal
+
+   !> Choose which triangles face the wall at x + u, and which of its vectors slips count along.
    pure subroutine wall_faces_choose(self, x, u)
       type(wall_faces_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
@@ -71,6 +88,9 @@ contains
          spot = wall_find(self%wall, wall_at(self%wall, x, u), sum(corner, 2)/3.0_wp)
          self%is_facing(t) = dot_product(normal, spot%normal) &
             < facing*sqrt(dot_product(normal, normal))
+      end do
+      do t = 1, size(self%node)
+         self%axis(t) = wall_axis_for(own_normal(self, t, x, u), self%usual_axis(t))
       end do
    end subroutine wall_faces_choose
 

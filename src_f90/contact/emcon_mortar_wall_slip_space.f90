@@ -5,11 +5,10 @@ module emcon_mortar_wall_slip_space
    use emcon_constraint, only : condition_t, most_slips
    use emcon_frame_vertex_space, only : frame_size
    use emcon_kinds, only : wp
-   use emcon_mortar_slave_space, only : mortar_slave_direction
    use emcon_mortar_wall_faces_space, only : wall_faces_corners, wall_faces_t, wall_faces_weight
    use emcon_mortar_wall_gap_space, only : n_corner, n_point, point, weight_of
    use emcon_node_sums, only : node_sums_first, node_sums_second
-   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_t
+   use emcon_wall_slip_space, only : n_wall_point, wall_axis, wall_slip, wall_slip_t
    implicit none
    private
    public :: mortar_wall_slip_areas, mortar_wall_slip_of, mortar_wall_slip_add
@@ -83,26 +82,12 @@ contains
       way(:, n_corner + 1:) = du(:, faces%wall%node)
    end subroutine gather
 
-   !> The direction of constraint `i` as the step begins, in the vectors of the wall.
-   pure function direction_of(faces, i, x, u0) result(along)
-      type(wall_faces_t), intent(in) :: faces
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp) :: along(n_dim)
-      real(wp) :: at(n_dim, n_wall_point - 1), direction(n_dim)
-      integer :: k
-
-      at = x(:, faces%wall%node) + u0(:, faces%wall%node)
-      direction = mortar_slave_direction(faces, faces%slave%node, i, x, u0)
-      along = [(dot_product(direction, at(:, k) - at(:, 1)), k = 2, n_wall_point - 1)]
-   end function direction_of
-
    !> Weights times slips of the points of a triangle.
    pure subroutine find_part(faces, moment, at, way, along, leaves_second, part)
       type(wall_faces_t), intent(in) :: faces
       real(wp), intent(in) :: moment(:)          !! (n_point) of `moments_of`, by the total
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, n_sum) of `gather` [L]
-      real(wp), intent(in) :: along(:)           !! of `direction_of`
+      real(wp), intent(in) :: along(:)           !! of `wall_axis`
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(part_t), intent(out) :: part
       real(wp) :: share(n_wall_point, n_sum)     !! of corners and the wall in a point and it
@@ -175,7 +160,7 @@ contains
             if (.not. area(t) > 0.0_wp) cycle
             call gather(faces, t, x, u0, du, at, way)
             call find_part(faces, moments_of(faces, area, k)/total, at, way, &
-               direction_of(faces, i, x, u0), .true., part)
+               wall_axis(faces%axis(i)), .true., part)
             slip = slip + part%f
          end associate
       end do
@@ -200,7 +185,7 @@ contains
             if (.not. area(t) > 0.0_wp) cycle
             call gather(faces, t, x, u0, du, at, way)
             call find_part(faces, moments_of(faces, area, k)/total, at, way, &
-               direction_of(faces, i, x, u0), item%leaves_second, part)
+               wall_axis(faces%axis(i)), item%leaves_second, part)
             call spread_part(faces, t, part, item)
          end associate
       end do

@@ -8,7 +8,7 @@ module emcon_node_sums
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: node_sums_first, node_sums_second
+   public :: node_sums_first, node_sums_second, node_sums_across
 
 contains
 
@@ -72,5 +72,34 @@ contains
       end do
       call nodes_add_second(factor, n_dim, full, place, of_node)
    end subroutine node_sums_second
+
+   !> Derivatives of those by the sums, by the components of one more sum.
+   pure subroutine node_sums_across(part, weight, by, factor, place, of_node)
+      real(wp), intent(in) :: part(:, :)         !! (components of the sums, n_dim)
+      real(wp), intent(in) :: weight(:, :)       !! (n - 1, sums) of nodes in the sums
+      real(wp), intent(in) :: by(:)              !! (n - 1) of nodes in the one more
+      real(wp), intent(in) :: factor             !! of what is added
+      integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
+      real(wp), intent(inout) :: of_node(:, :)   !! components of nodes, twice
+      real(wp) :: full(size(part, 2)*size(by), size(part, 2)*size(by))
+      integer :: a, i, j, k
+
+      full = 0.0_wp
+      associate (n_dim => size(part, 2))
+         do k = 1, size(by)
+            if (.not. abs(by(k)) > 0.0_wp) cycle
+            do j = 1, size(weight, 2)
+               do i = 1, size(by)
+                  do a = 1, n_dim
+                     associate (to => full(n_dim*(i - 1) + 1:n_dim*i, n_dim*(k - 1) + a))
+                        to = to + weight(i, j)*by(k)*part(n_dim*(j - 1) + 1:n_dim*j, a)
+                     end associate
+                  end do
+               end do
+            end do
+         end do
+         call nodes_add_second(factor, n_dim, full, place, of_node)
+      end associate
+   end subroutine node_sums_across
 
 end module emcon_node_sums

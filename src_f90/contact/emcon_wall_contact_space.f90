@@ -22,7 +22,8 @@ module emcon_wall_contact_space
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
    use emcon_wall_gap_space, only : dg_t, wall_gap, wall_gap_nodes
-   use emcon_wall_slip_space, only : n_wall_point, wall_axis, wall_slip, wall_slip_t
+   use emcon_wall_slip_space, only : n_wall_point, wall_axis, wall_axis_for, wall_own_normal, &
+      wall_slip, wall_slip_t
    implicit none
    private
    public :: wall_contact_t, wall_contact_init
@@ -35,8 +36,6 @@ module emcon_wall_contact_space
    real(wp), parameter :: near_per_facet = 0.5_wp, near_per_motion = 2.0_wp
    !> A node faces a wall if it does so with this part of its area at least.
    real(wp), parameter :: least_faced = 0.25_wp
-   !> A vector that is normal to the wall but for this part of it is none to count slip along.
-   real(wp), parameter :: least_along = 0.5_wp
 
    type, extends(contact_t) :: wall_contact_t
       type(wall_t) :: wall
@@ -111,7 +110,7 @@ contains
       u = 0.0_wp
       do i = 1, self%n_constraint
          associate (normal => own_normal(self, i, x, u))
-            self%usual_along(i) = minloc(abs(normal), 1)
+            self%usual_along(i) = wall_axis_for(normal)
          end associate
       end do
       self%along = self%usual_along
@@ -123,12 +122,9 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp) :: normal(3)
-      type(wall_spot_t) :: spot
 
-      associate (at => wall_at(self%wall, x, u))
-         spot = wall_find(self%wall, at, point_in(self, i, x) + point_in(self, i, u))
-         normal = matmul(spot%normal, at(:, 2:) - spread(at(:, 1), 2, 3))/self%wall%arm
-      end associate
+      normal = wall_own_normal(self%wall, wall_at(self%wall, x, u), point_in(self, i, x) &
+         + point_in(self, i, u))
    end function own_normal
 
    !> Corners of bodies are held nearly at once beside means of gaps, which do not see them.
@@ -215,11 +211,7 @@ contains
       integer :: i
 
       do i = 1, self%n_constraint
-         associate (normal => own_normal(self, i, x, u0))
-            self%along(i) = self%usual_along(i)
-            if (1.0_wp - normal(self%along(i))**2 < least_along**2) self%along(i) &
-               = minloc(abs(normal), 1)
-         end associate
+         self%along(i) = wall_axis_for(own_normal(self, i, x, u0), self%usual_along(i))
       end do
       self%reach = max(self%reach, self%depth + near_per_facet*maxval([0.0_wp, self%size]), &
          self%depth + near_per_motion*sqrt(maxval([0.0_wp, sum(du(:, self%node)**2, 1)])))

@@ -10,10 +10,12 @@ module emcon_wall_slip_space
    use emcon_wall_distance_space, only : wall_bend, wall_find, wall_spot_t
    implicit none
    private
-   public :: wall_slip_t, wall_slip, wall_axis, n_wall_point
+   public :: wall_slip_t, wall_slip, wall_axis, wall_axis_for, wall_own_normal, n_wall_point
 
    !> The point, and the origin and tips of vectors of the wall.
    integer, parameter :: n_wall_point = 5, n_dim = 3
+   !> A vector that is normal to the wall but for this part of it is none to count slip along.
+   real(wp), parameter :: least_along = 0.5_wp
 
    type :: wall_slip_t
       real(wp) :: f(2) = 0.0_wp                  !! slip over the step [L]
@@ -147,6 +149,29 @@ contains
       axis = 0.0_wp
       axis(i) = 1.0_wp
    end function wall_axis
+
+   !> The vector of the wall that slip is counted along where the wall has a normal: the usual one,
+   !> unless it is nearly normal; then, or if there is none, the one that is most along the wall.
+   pure integer function wall_axis_for(normal, usual) result(axis)
+      real(wp), intent(in) :: normal(n_dim)      !! of `wall_own_normal`
+      integer, intent(in), optional :: usual     !! 1 to 3
+
+      axis = minloc(abs(normal), 1)
+      if (.not. present(usual)) return
+      if (1.0_wp - normal(usual)**2 >= least_along**2) axis = usual
+   end function wall_axis_for
+
+   !> The normal of the wall that a point sees, in the vectors of the wall.
+   pure function wall_own_normal(wall, at, point) result(normal)
+      type(wall_t), intent(in) :: wall
+      real(wp), intent(in) :: at(n_dim, n_wall_point - 1)   !! its origin and tips [L]
+      real(wp), intent(in) :: point(n_dim)       !! [L]
+      real(wp) :: normal(n_dim)
+      type(wall_spot_t) :: spot
+
+      spot = wall_find(wall, at, point)
+      normal = matmul(spot%normal, at(:, 2:) - spread(at(:, 1), 2, n_dim))/wall%arm
+   end function wall_own_normal
 
    !> Origin and tips of the wall in its vectors.
    pure function own_vectors(wall) result(own)

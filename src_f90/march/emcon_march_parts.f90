@@ -4,6 +4,7 @@ module emcon_march_parts
       step_diverged, step_done, step_loose, step_not_held, step_overlaps, step_passes_event, &
       step_refused, step_rough, step_singular, step_stands_off, step_strikes, step_too_far, &
       step_unbalanced
+   use emcon_constraints, only : constraint_index
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_evaluation, only : evaluation_has_inertia
    use emcon_kinds, only : wp
@@ -333,18 +334,28 @@ contains
          "let contact give way by *CONSTRAINT METHOD, TYPE=PENALTY"
    end subroutine cycling_text
 
-   !> A contact meets in the step what its stencil does not know, or begins deep: at which nodes?
+   !> A contact meets in the step what its stencil does not know, or begins deep: at which nodes? A
+   !> rigid wall has no faces, and is no slave.
    subroutine too_far_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: nodes, remedy
+      logical :: is_wall
 
+      is_wall = blames_walls(self, scene)
       text = "a contact begins too deep or slides too far for one increment"
       remedy = "give the other surface longer edges there"
+      if (is_wall) remedy = "give the body longer edges there"
       if (active_set_goes_on(self%active)) then
          text = "the solutions of the increment touch other faces than those assumed for them"
          remedy = "let the smaller surface be the slave, or take another TYPE of *CONTACT PAIR"
+         if (is_wall) then
+            text = "each solution of the increment meets another part of the wall than it was " &
+               // "found for"
+            remedy = "round the corners of the wall, give the body smaller faces there, or take " &
+               // "another TYPE of *CONTACT PAIR"
+         end if
       end if
       if (.not. any(self%active%candidates%is_blamed)) return
       call nodes_text(self, scene, self%active%candidates%is_blamed, nodes)
@@ -352,6 +363,27 @@ contains
       if (.not. self%active%rules%may_cut) text = text // "; allow for smaller increments, or " // &
          remedy
    end subroutine too_far_text
+
+   !> Are all contacts that a step has failed for with rigid walls?
+   pure logical function blames_walls(self, scene)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      integer :: id, pair, i
+
+      associate (is_blamed => self%active%candidates%is_blamed)
+         blames_walls = any(is_blamed)
+         do id = 1, size(is_blamed)
+            if (.not. is_blamed(id)) cycle
+            call constraint_index(self%system, id, pair, i)
+            if (pair > 0 .and. pair <= size(scene%pair)) then
+               blames_walls = blames_walls .and. allocated( &
+                  scene%surface(scene%pair(pair)%master)%wall)
+            else
+               blames_walls = .false.
+            end if
+         end do
+      end associate
+   end function blames_walls
 
    !> Why an increment with STABILIZE is to be smaller.
    pure subroutine snap_text(self, text)

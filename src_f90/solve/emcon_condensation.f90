@@ -196,7 +196,9 @@ contains
       do k = 1, size(slot)
          self%tangent%value(slot(k)) = system%matrix%value(k)
       end do
-      if (has_curvature) call constraints_add_curvature(set, system%space%numbering, self%tangent)
+      ! Who solves for the multipliers of slips scales them with the normal force.
+      if (has_curvature) call constraints_add_curvature(set, system%space%numbering, &
+         self%tangent, .true.)
       self%support = 0.0_wp
       if (supports .and. set%n_permanent > 0) then
          self%support = real(maxval(abs(self%tangent%value)), wp)

@@ -251,14 +251,21 @@ contains
    end function condition_rate
 
    !> What the forces of a condition fall by with the end coordinates of its nodes, node by node,
-   !> while the multipliers of its rows stay.
-   pure function condition_stiffness(self, lam) result(stiffness)
+   !> while the multipliers of its rows stay; with `follows` those of slips by the normal force of a
+   !> multiplier of 1.
+   pure function condition_stiffness(self, lam, follows) result(stiffness)
       type(condition_t), intent(in) :: self           !! with second derivatives
       real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      logical, intent(in), optional :: follows        !! else friction of rows of slips stays
       real(wp), dimension(size(self%g, 1)*self%n_node, size(self%g, 1)*self%n_node) :: stiffness
-      real(wp) :: along(size(stiffness, 1), 0:most_slips), tau(most_slips)
+      real(wp) :: along(size(stiffness, 1), 0:most_slips), tau(most_slips), by_normal(most_slips)
       integer :: s, m, n_slip
 
+      by_normal = self%response%mu_sigma*lam
+      if (present(follows)) then
+         if (follows .and. self%normal > 0.0_wp) by_normal = condition_friction(self, lam) &
+            /self%normal
+      end if
       m = size(stiffness, 1)
       n_slip = 0
       if (self%has_friction) n_slip = size(self%t, 3)
@@ -268,8 +275,8 @@ contains
       do s = 1, n_slip
          along(:, s) = reshape(self%t(:, :self%n_node, s), [m])
          stiffness = stiffness + tau(s)*self%ht(:m, :m, s)
-         if (.not. (self%is_mean .and. abs(self%response%mu_sigma(s)) > 0.0_wp)) cycle
-         stiffness = stiffness + self%response%mu_sigma(s)*lam*spread(along(:, s), 2, m) &
+         if (.not. (self%is_mean .and. abs(by_normal(s)) > 0.0_wp)) cycle
+         stiffness = stiffness + by_normal(s)*spread(along(:, s), 2, m) &
             *spread(condition_normal_slope(self), 1, m)
       end do
       if (all(abs(self%response%stiffness) <= 0.0_wp)) return

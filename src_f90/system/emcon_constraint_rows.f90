@@ -266,10 +266,11 @@ contains
 
    !> Subtract the derivatives of the forces of all conditions by q1 from the matrix `merged`, with
    !> multipliers of rows as they are.
-   subroutine constraints_add_curvature(self, numbering, merged)
+   subroutine constraints_add_curvature(self, numbering, merged, follows)
       type(constraint_set_t), intent(in) :: self
       type(numbering_t), intent(in) :: numbering
       type(csr_t), intent(inout) :: merged
+      logical, intent(in), optional :: follows   !! as `condition_stiffness` has it
       integer :: k, n
 
       do k = self%n_linear + 1, self%n_condition
@@ -277,7 +278,7 @@ contains
             n = size(item%g, 1)*item%n_node
             if (item%has_friction .or. allocated(self%law(k)%beside)) then
                call subtract_sum(item, -1.0_wp, condition_stiffness(item, &
-                  constraints_lam(self, k)), numbering, merged)
+                  constraints_lam(self, k), follows), numbering, merged)
             else if (any(abs(item%h(:n, :n)) > 0.0_wp)) then
                call subtract_sum(item, self%lam(k), item%h(:n, :n), numbering, merged)
             end if

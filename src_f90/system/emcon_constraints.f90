@@ -18,7 +18,7 @@ module emcon_constraints
    implicit none
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
-   public :: constraints_stick, constraints_take_hold, constraints_take_lam, &
+   public :: constraints_stick, constraints_take_hold, constraints_take_lam, constraints_normals, &
       constraints_gives_back
    public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
       constraints_dissipated
@@ -124,6 +124,18 @@ contains
          self%item(self%condition(k))%response%stick(self%slip(k)) = self%lam(k)
       end do
    end subroutine constraints_take_hold
+
+   !> Of rows of slips the normal force by a multiplier of 1; else 1.
+   pure function constraints_normals(self) result(normal)
+      type(constraint_set_t), intent(in) :: self !! evaluated
+      real(wp) :: normal(self%n_row)
+      integer :: k
+
+      do k = 1, self%n_row
+         normal(k) = 1.0_wp
+         if (self%slip(k) > 0) normal(k) = self%item(self%condition(k))%normal
+      end do
+   end function constraints_normals
 
    !> Multipliers from outside, for the motion that was evaluated: friction answers to them.
    subroutine constraints_take_lam(self, lam)

@@ -4,7 +4,7 @@ module test_contact_slips_space
    use box_contacts, only : draw_meshes => draw, draw_on_wall, evaluate, kind, look, make_boxes, &
       seen, sum_up
    use check, only : check_near, check_true, test_case_t
-   use emcon_constraint, only : condition_normal, condition_t
+   use emcon_constraint, only : condition_normal, condition_stiffness, condition_t
    use emcon_contact, only : contact_t
    use emcon_contact_registry, only : new_contact
    use emcon_errors, only : error_t
@@ -31,7 +31,8 @@ contains
          test_case_t("identity and momenta", test_identity), &
          test_case_t("rigid motions are no slip", test_rigid), &
          test_case_t("a block that slides slips by its way", test_slide), &
-         test_case_t("derivatives against differences", test_derivatives)]
+         test_case_t("derivatives against differences", test_derivatives), &
+         test_case_t("at the end of a step, against differences", test_at_end)]
    end subroutine collect_contact_slips_space
 
    !> Two of three draws are meshes, and one is a wall.
@@ -194,5 +195,78 @@ contains
       end do
       call check_true(error, n_seen > 40, "conditions on the same nodes")
    end subroutine test_derivatives
+
+   !> Friction that acts by the end of a step alone: directions and lengths are those there, and
+   !> move with it, as the normal force does that friction is in proportion to. Second derivatives
+   !> are by one end of a motion, of two; third ones are as large as squares of these.
+   subroutine test_at_end(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      type(condition_t), allocatable :: item(:), up(:), down(:)
+      real(wp), allocatable :: du(:, :), way(:, :)
+      real(wp) :: step, bound
+      integer :: i, k, n, n_seen
+      real(wp), parameter :: push = 0.7_wp, friction(2) = [0.3_wp, -0.2_wp]
+
+      step = eps**(1.0_wp/3.0_wp)
+      bound = 1.0e3_wp*step**2
+      n_seen = 0
+      do k = 1, 12
+         call draw(k, 0.1_wp, scene, du, contact, error)
+         if (allocated(error)) return
+         contact%step%pushes_at_end = .true.
+         call look(contact, scene, du)
+         way = 0.0_wp*du
+         call draw_random(way)
+         way = 2.0_wp*way - 1.0_wp
+         call evaluate_at(0.0_wp, .false., item)
+         call evaluate_at(step, .true., up)
+         call evaluate_at(-step, .true., down)
+         do i = 1, size(item)
+            n = item(i)%n_node
+            if (n /= up(i)%n_node .or. n /= down(i)%n_node) cycle
+            if (any(item(i)%node(:n) /= up(i)%node(:n))) cycle
+            n_seen = n_seen + 1
+            item(i)%h = 2.0_wp*item(i)%h
+            item(i)%ht = 2.0_wp*item(i)%ht
+            item(i)%normal = condition_normal(item(i))
+            item(i)%response%stick = item(i)%normal*friction
+            associate (by => reshape(way(:, item(i)%node(:n)), [3*n]))
+               call check_near(error, -matmul(condition_stiffness(item(i), push, .true.), by), &
+                  (force_of(up(i)) - force_of(down(i)))/(2.0_wp*step), bound, max(1.0_wp, &
+                  maxval(abs(item(i)%ht(:3*n, :3*n, :))), maxval(abs(item(i)%h(:3*n, :3*n))))**2, &
+                  "stiffness " // to_text(k))
+            end associate
+         end do
+      end do
+      call check_true(error, n_seen > 40, "conditions on the same nodes")
+
+   contains
+
+      !> At the end of the step and a part of `way`.
+      subroutine evaluate_at(part, leaves_second, item)
+         real(wp), intent(in) :: part
+         logical, intent(in) :: leaves_second
+         type(condition_t), allocatable, intent(out) :: item(:)
+         type(scene_t) :: moved
+
+         moved = scene
+         moved%u0 = scene%u0 + du + part*way
+         call evaluate(contact, moved, 0.0_wp*du, leaves_second, seen(contact), item, .true.)
+      end subroutine evaluate_at
+
+      !> What a push and friction in proportion to it are on all nodes.
+      function force_of(item) result(force)
+         type(condition_t), intent(in) :: item
+         real(wp) :: force(3*item%n_node)
+
+         associate (n => item%n_node)
+            force = push*reshape(item%g(:, :n), [3*n]) - condition_normal(item)*reshape( &
+               friction(1)*item%t(:, :n, 1) + friction(2)*item%t(:, :n, 2), [3*n])
+         end associate
+      end function force_of
+
+   end subroutine test_at_end
 
 end module test_contact_slips_space

@@ -109,6 +109,16 @@ contains
                   (k == 2 .or. (k == 3 .and. i == 1)), "what to do: " // text)
             end do
          end do
+         ! A rigid wall is no slave, and has no faces.
+         march%active%candidates%is_blamed(2) = .true.
+         march%active%n_stale = huge(i)
+         do k = 1, 2
+            if (k == 2) allocate(scene%surface(scene%pair(1)%master)%wall)
+            call march_reason(march, scene, step_too_far, text)
+            call check_true(error, index(text, "other faces") > 0 .eqv. k == 1, text)
+            call check_true(error, index(text, "be the slave") > 0 .eqv. k == 1, text)
+            call check_true(error, index(text, "the wall") > 0 .eqv. k == 2, text)
+         end do
       end associate
       call stepper_close(stepper)
    end subroutine test_reasons

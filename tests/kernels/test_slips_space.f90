@@ -7,6 +7,7 @@ module test_slips_space
    use emcon_errors, only : error_t
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_kinds, only : wp
+   use emcon_rotation, only : cross_product
    use emcon_text, only : to_text
    use emcon_wall, only : wall_t
    use emcon_wall_slip_space, only : wall_slip, wall_slip_t
@@ -46,7 +47,8 @@ contains
          test_case_t("turned scenes slip by as much", test_turned), &
          test_case_t("along a plane it is the way there", test_plane), &
          test_case_t("around a ball it is the chord of the way", test_ball), &
-         test_case_t("derivatives against differences", test_derivatives)]
+         test_case_t("derivatives against differences", test_derivatives), &
+         test_case_t("a step that ends where it starts, against differences", test_at_one_place)]
    end subroutine collect_slips_space
 
    !> The nodes of kind `kind`, and a step of size `size` in which they turn and move apart.
@@ -98,14 +100,14 @@ contains
 
       select case (kind)
       case (of_frame)
-         call frame_slip(x(:, :4), dx(:, :4), along, .true., frame)
+         call frame_slip(x(:, :4), dx(:, :4), along, .true., .false., frame)
          slips%f = frame%f
          do k = 1, 2
             call nodes_add_first(1.0_wp, frame%g(:, k), [1, 2, 3, 4], slips%g(:, :, k))
             call nodes_add_first(1.0_wp, frame%c(:, k), [1, 2, 3, 4], slips%c(:, :, k))
          end do
       case (of_edges)
-         call edge_pair_slip(x(:, :4), dx(:, :4), .false., edges)
+         call edge_pair_slip(x(:, :4), dx(:, :4), .false., .false., edges)
          slips%f = edges%f
          slips%g(:, :4, :) = edges%g
          slips%c(:, :4, :) = edges%c
@@ -299,5 +301,39 @@ contains
          end do
       end do
    end subroutine test_derivatives
+
+   !> Directions and lengths of a frame are those where it is, and move with it and with `along`.
+   subroutine test_at_one_place(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(wall_t) :: wall
+      type(frame_slip_t) :: slip, up, down
+      real(wp), dimension(3, n_node) :: x, way
+      real(wp) :: step, bound, turn(3), least(3)
+      integer :: k, s
+
+      step = eps**(1.0_wp/3.0_wp)
+      bound = 1.0e3_wp*step**2
+      do k = 1, 20
+         call draw_step(of_frame, 0.0_wp, wall, x, way)
+         call draw_random(way)
+         call draw_random(turn)
+         way(:, 1) = 0.0_wp                      ! the origin stays
+         ! Half of them along what is nearly normal, where another axis is taken.
+         call draw_random(least)
+         associate (normal => cross_product(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1)))
+            least = merge(along, normal + 0.05_wp*least, mod(k, 2) == 0)
+         end associate
+         call frame_slip(x(:, :4), 0.0_wp*x(:, :4), least, .false., .true., slip)
+         call frame_slip(x(:, :4) + step*way(:, :4), 0.0_wp*x(:, :4), least + step*turn, .true., &
+            .true., up)
+         call frame_slip(x(:, :4) - step*way(:, :4), 0.0_wp*x(:, :4), least - step*turn, .true., &
+            .true., down)
+         do s = 1, 2
+            call check_near(error, 2.0_wp*(matmul(slip%h(:, :, s), reshape(way(:, 2:4), [9])) &
+               + matmul(slip%by_along(:, :, s), turn)), (up%g(:, s) - down%g(:, s)) &
+               /(2.0_wp*step), bound, 1.0_wp, "second derivative " // to_text(k))
+         end do
+      end do
+   end subroutine test_at_one_place
 
 end module test_slips_space

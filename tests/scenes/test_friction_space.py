@@ -502,6 +502,20 @@ def test_a_twisted_ball_nears_hertz(tmp_path: Path) -> None:
         torque = (place[:, 0]*force[:, 1] - place[:, 1]*force[:, 0]).sum()
         error.append(torque/ball.torque(force[:, 2].sum()) - 1)
         # It is that of the forces which there are: all of them slide round the axis.
+def test_a_belt_that_contact_alone_holds(tmp_path: Path) -> None:
+    """Off the drum its free end would go 150 times its length under what pulls it: tangents without the stiffness of contact
+    are of no use. All of it slides after the first increment, and each one more is solved by two tangents."""
+    mu, thickness = .3, .02
+    block, text = belt(48, mu, thickness)
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    assert run.history["cuts"].sum() == 0
+    assert run.history["newton"][2:].max() <= 3
+    pull = -run.fields()["reaction_force"][-1, np.array(block.on(0, 0)) - 1, 2].sum()
+    # Half of the thickness, and sides of the polygon: (pi/48)^2/8.
+    assert pull == pytest.approx(np.exp(mu*np.pi/(1 + thickness/2)), rel=.001)
+
+
         by_forces = ball.mu*(force[:, 2]*np.hypot(place[:, 0], place[:, 1])).sum()
         assert torque == pytest.approx(by_forces, rel=1e-3)
         assert run.verdict["law_violation"] < 1e-8
