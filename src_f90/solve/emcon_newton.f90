@@ -505,7 +505,8 @@ contains
          call constraints_rows(set, system%space%numbering)
       end if
       call phase_leave(system%phases, phase_eliminate)
-      call correction_lay_out(self%correction, system, set)
+      call correction_lay_out(self%correction, system, set, self%n_solve > 0 &
+         .and. self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete)
       call phase_leave(system%phases, left)
    end subroutine evaluate_damped
 
