@@ -104,7 +104,7 @@ contains
       self%is_condensed = is_found
       if (is_found) then
          newton%convergence%n_iteration = newton%convergence%n_iteration + 1
-         call find_hold(self, system, set)
+         if (.not. self%keeps_tangent) call find_hold(self, system, set)
          call solve_condensed(self, set, newton%n_solve > 0, is_found)
       end if
       if (is_found) self%status = contact_problem_status(self%problem, self%push)
@@ -136,6 +136,8 @@ contains
          if (level > 0) call soften(self, softer(level))
          call contact_parts_solve(self%problem, self%push, effort, is_solved, level > 0 .or. &
             self%rest%n_stall < exact_turn, self%slope)
+         ! What was softened is laid out anew.
+         if (level > 0) self%slope%stays = .false.
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)
@@ -161,15 +163,17 @@ contains
    end subroutine find_hold
 
    !> The problem of the contacts as it was condensed. Without friction a contact has no slips to
-   !> solve for: any one by itself.
+   !> solve for: any one by itself. Where no slip is a row W is that of the last problem, with what
+   !> was made of it, as long as the tangent is.
    subroutine lay_out(self, set)
       type(contact_newton_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       integer :: k, i, m, place(set%n_row - set%n_permanent)
 
       m = 1 + self%problem%n_slip
+      self%slope%stays = self%slope%stays .and. self%keeps_tangent .and. m == 1
       associate (problem => self%problem, first => set%n_permanent, w => self%condensation%w)
-         problem%w = 0.0_wp
+         if (.not. self%slope%stays) problem%w = 0.0_wp
          problem%free = 0.0_wp
          call contact_rest_gather(set, set%lam, problem%base)
          call contact_rest_gather(set, self%condensation%hold, problem%hold)
@@ -177,7 +181,7 @@ contains
          problem%start(1:, :) = problem%start(1:, :) - problem%slip_target
          place = m*(set%condition(first + 1:) - first - 1) + 1 + set%slip(first + 1:)
          do k = 1, size(w, 1)
-            problem%w(place, place(k)) = w(:, k)
+            if (.not. self%slope%stays) problem%w(place, place(k)) = w(:, k)
             problem%free(set%slip(first + k), set%condition(first + k) - first) &
                = self%condensation%free(k)
          end do

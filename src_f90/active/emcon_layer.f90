@@ -77,6 +77,7 @@ contains
       call self%state%contacts%begin(n)
       call motion_init(self%motion, scene%x)
       allocate(self%du, self%push, source=at_rest(scene%x))
+      allocate(self%newton)
       call active_set_init(self%active, self%system)
    end subroutine layer_init
 
@@ -272,7 +273,7 @@ contains
    subroutine layer_free(self)
       type(layer_t), intent(inout) :: self
 
-      call correction_free(self%newton%correction)
+      if (allocated(self%newton)) call correction_free(self%newton%correction)
    end subroutine layer_free
 
    !> Balance z at the end of a solved step, if that has opened, closed or moved contacts. `active`

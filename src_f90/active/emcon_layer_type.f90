@@ -21,7 +21,7 @@ module emcon_layer_type
       type(host_t) :: laws              !! that the model is given
       type(scene_t) :: scene            !! the elements on these nodes
       type(system_t) :: system          !! and the contact of the whole
-      type(newton_t) :: newton
+      type(newton_t), allocatable :: newton      !! if it is on
       type(active_set_t) :: active
       type(state_t) :: state            !! what acts, with which multipliers
       type(motion_t) :: motion

@@ -11,8 +11,8 @@ module emcon_correction
    use emcon_kinds, only : dp, int64, wp
    use emcon_memory, only : memory_factors, memory_go_on, memory_take
    use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
-      null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
-      obstacle_pivot
+      null_space_renew, null_space_solve, null_space_t, null_space_update, obstacle_fill, &
+      obstacle_none, obstacle_pivot
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_free, saddle_point_init, &
       saddle_point_reset, saddle_point_solve, saddle_point_t
    use emcon_solver_registry, only : solver_create, solver_default
@@ -105,10 +105,13 @@ contains
 
    !> Prepare for the active constraints at their present gradients; `n_redundant` > 0: some of
    !> them depend on others, and have to be dropped.
-   subroutine correction_lay_out(self, system, set)
+   subroutine correction_lay_out(self, system, set, goes_on)
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
+      !> The next iterate of a solve whose choice of unknowns may stay; .false. if it is not given
+      logical, intent(in), optional :: goes_on
+      logical :: may_stay
 
       self%n_redundant = 0
       self%knows_multipliers = .true.
@@ -123,11 +126,15 @@ contains
          return
       end if
       call stopwatch_start(self%clock)
+      may_stay = .false.
+      if (present(goes_on)) may_stay = goes_on
       associate (null_space => self%null_space)
          if (.not. has_pattern(self, set)) then
             call take_pattern(self, set)
             if (self%method == method_null_space) call null_space_init(null_space, set, &
                n_merged(system, set), system%space%numbering)
+         else if (self%method == method_null_space .and. may_stay) then
+            call null_space_renew(null_space, set, system%space%numbering)
          else if (self%method == method_null_space) then
             call null_space_update(null_space, set, system%space%numbering)
          end if

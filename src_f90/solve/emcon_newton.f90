@@ -306,7 +306,8 @@ contains
       end do
    end subroutine solve_by_tangents
 
-   !> Once in a solve, where a few digits are right: does the step ask for another set?
+   !> Once in a solve, where a few digits are right: does the step ask for another set? Where a
+   !> correction takes iterations a look costs little beside it: there is one after each.
    subroutine look(self, system, set, motion, size, status)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -314,15 +315,16 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: size               !! relative residual
       integer, intent(inout) :: status           !! `newton_early` if so
-      logical :: changes
+      logical :: changes, iterates
       real(wp) :: left
 
       ! Before any correction the multipliers are those of a guess: where that flies, round-off.
       if (.not. self%looks_early .or. size > early_enough .or. self%n_solve == 0) return
-      self%looks_early = .false.
+      iterates = self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete
+      self%looks_early = iterates
       left = huge(left)
       ! Where something rubs sets change in most steps.
-      if (self%convergence%is_kept .and. any(set%item(:set%n)%has_friction)) then
+      if (iterates .or. (self%convergence%is_kept .and. any(set%item(:set%n)%has_friction))) then
          left = maxval(abs(self%dq))
       end if
       call predicts_new_set(system, set, motion, left, changes)
@@ -503,7 +505,8 @@ contains
          call constraints_rows(set, system%space%numbering)
       end if
       call phase_leave(system%phases, phase_eliminate)
-      call correction_lay_out(self%correction, system, set)
+      call correction_lay_out(self%correction, system, set, self%n_solve > 0 &
+         .and. self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete)
       call phase_leave(system%phases, left)
    end subroutine evaluate_damped
 

@@ -25,9 +25,9 @@ module emcon_null_space
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
    private
-   public :: null_space_t, null_space_init, null_space_update, null_space_factorise, &
-      null_space_solve, null_space_multipliers, null_space_matrices, null_space_particular, &
-      null_space_free
+   public :: null_space_t, null_space_init, null_space_update, null_space_renew, &
+      null_space_factorise, null_space_solve, null_space_multipliers, null_space_matrices, &
+      null_space_particular, null_space_free
    public :: obstacle_none, obstacle_redundant, obstacle_pivot, obstacle_fill
 
    !> Why the constraints cannot be eliminated.
@@ -39,12 +39,18 @@ module emcon_null_space
    !> Refinements of the multipliers at most: a `dp` solution gains 16 digits or less each time.
    integer, parameter :: most_refinements = merge(4, 1, epsilon(1.0_wp) < epsilon(1.0_dp))
 
+   !> A choice does for gradients that are other ones by this part: what was left of a row that is
+   !> neither redundant nor near is a hundred times as much.
+   real(dp), parameter :: alike = 1.0e-4_dp
+
    type :: null_space_t
       integer :: obstacle = obstacle_none
       type(independent_rows_t) :: rows           !! what is redundant, and the choice
       integer :: n_entry = 0                     !! of N
       integer :: n_free = 0                      !! independent unknowns
       type(dependent_block_t) :: present         !! Gb_d of the last `null_space_update`
+      !> (2, entries) values of rows that `null_space_renew` has made a choice for
+      real(dp), allocatable, private :: chosen_for(:, :)
       type(null_basis_t) :: basis                !! as of the last factorisation, like all below
       type(dependent_block_t) :: force, gap      !! Gb_d and G1_d
       type(csr_t) :: p                           !! (n_unknown x n_free)
@@ -115,6 +121,7 @@ contains
       type(numbering_t), intent(in) :: numbering
       integer :: k
 
+      if (allocated(self%chosen_for)) deallocate(self%chosen_for)
       call independent_rows_find(self%rows, set, numbering)
       self%obstacle = obstacle_none
       if (self%rows%is_poor) self%obstacle = obstacle_pivot
@@ -130,6 +137,53 @@ contains
       call dependent_block_factorise(self%present, set%force_rows)
       if (self%present%bands%is_singular) self%obstacle = obstacle_pivot
    end subroutine null_space_update
+
+   !> The same for the next iterate of a solve: a choice that was made for gradients like the
+   !> present ones stays. Gb_d is that of these.
+   subroutine null_space_renew(self, set, numbering)
+      type(null_space_t), intent(inout) :: self  !! last updated in the same solve, or renewed
+      type(constraint_set_t), intent(in) :: set  !! of the pattern it was begun with
+      type(numbering_t), intent(in) :: numbering
+
+      if (is_alike(self, set)) then
+         call dependent_block_factorise(self%present, set%force_rows)
+         if (.not. self%present%bands%is_singular) return
+      end if
+      call null_space_update(self, set, numbering)
+      if (all(self%obstacle /= [obstacle_none, obstacle_fill])) return
+      associate (n => set%force_rows%row_start(set%n_row + 1))
+         allocate(self%chosen_for(2, n))
+         self%chosen_for(1, :) = set%force_rows%value(:n)
+         self%chosen_for(2, :) = set%gap_rows%value(:n)
+      end associate
+   end subroutine null_space_renew
+
+   !> Are rows nearly those that the last choice was made for?
+   pure logical function is_alike(self, set)
+      type(null_space_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      is_alike = allocated(self%chosen_for)
+      if (is_alike) is_alike = size(self%chosen_for, 2) == set%force_rows%row_start(set%n_row + 1)
+      if (.not. is_alike) return
+      do k = 1, set%n_row
+         associate (from => set%force_rows%row_start(k) + 1, to => set%force_rows%row_start(k + 1))
+            is_alike = max(part_of(set%force_rows%value(from:to), self%chosen_for(1, from:to)), &
+               part_of(set%gap_rows%value(from:to), self%chosen_for(2, from:to))) <= alike
+         end associate
+         if (.not. is_alike) return
+      end do
+   end function is_alike
+
+   !> By which part of its largest entry a row is another one than before.
+   pure real(dp) function part_of(row, before) result(part)
+      real(dp), intent(in) :: row(:), before(:)
+
+      part = 0.0_dp
+      if (size(row) > 0) part = maxval(abs(row - before))
+      if (part > 0.0_dp) part = part/max(maxval(abs(row)), tiny(part))
+   end function part_of
 
    !> The two choices are made and are one.
    pure logical function is_same(a, b)

@@ -13,8 +13,8 @@ module emcon_contact_problem
    private
    public :: contact_problem_t, contact_effort_t, contact_problem_create, contact_problem_force, &
       contact_problem_forces, contact_problem_motion, contact_problem_map, contact_problem_missed, &
-      contact_problem_missed_by, contact_problem_status, contact_problem_stiffness, &
-      contact_problem_own_stiffness, contact_problem_row_sizes
+      contact_problem_missed_by, contact_problem_slope, contact_problem_status, &
+      contact_problem_stiffness, contact_problem_own_stiffness, contact_problem_row_sizes
 
    !> The law is met where it is missed by less than this part of the largest force: by what a solve
    !> in double precision leaves of some hundred forces. Where no turn comes to that W is nearly
@@ -206,40 +206,40 @@ contains
    end function contact_problem_missed_by
 
    !> Forces less those that the natural map makes of them.
-   pure subroutine contact_problem_map(self, push, defect, slope, largest)
+   pure subroutine contact_problem_map(self, push, defect, by, largest)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
-      real(dp), intent(out), optional :: slope(:, :) !! of `defect` by y, proximal
+      !> (0:n_slip, 0:n_slip, n) what the law makes of trials grows by these: row, by
+      real(wp), intent(out), optional :: by(0:, 0:, :)
       real(wp), intent(out), optional :: largest     !! force [M L/T^2]
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
-      real(wp) :: mapped(0:most_slips), by(0:most_slips, 0:most_slips, size(self%mu)), &
-         stiffness(size(self%mu))
+      real(wp) :: mapped(0:most_slips), grows(0:most_slips, 0:most_slips)
       integer :: i
 
       motion = contact_problem_motion(self, push)
       force = contact_problem_forces(self, push, motion)
       do i = 1, size(self%mu)
-         stiffness(i) = contact_problem_stiffness(self, i)
-         call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness(i), &
-            mapped, by(:, :, i))
+         call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), &
+            contact_problem_stiffness(self, i), mapped, grows)
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
+         if (present(by)) by(:, :, i) = grows(:self%n_slip, :self%n_slip)
       end do
       if (present(largest)) largest = maxval(abs(force))
-      if (present(slope)) call find_slope(self, stiffness, by(:self%n_slip, :self%n_slip, :), slope)
    end subroutine contact_problem_map
 
-   !> What the natural map grows by with y, proximal.
-   pure subroutine find_slope(self, stiffness, by, slope)
+   !> What the natural map grows by with y, proximal: of W, c, stiffness and `by` alone.
+   pure subroutine contact_problem_slope(self, by, slope)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: stiffness(:)           !! (n) of the map [M/T^2]
-      real(wp), intent(in) :: by(0:, 0:, :)          !! (row, by, n) its derivatives by the trial
-      real(dp), intent(out) :: slope(:, :)
+      real(wp), intent(in) :: by(0:, 0:, :)          !! as of `contact_problem_map`
+      real(dp), intent(out) :: slope(:, :)           !! of `defect` by y, as W
       real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu)), own(0:self%n_slip)
+      real(wp) :: stiffness(size(self%mu))
       integer :: i, j, k, m
 
       m = 1 + self%n_slip
       do i = 1, size(self%mu)
+         stiffness(i) = contact_problem_stiffness(self, i)
          do k = 0, self%n_slip
             gain(:, k, i) = (stiffness(i) + self%hold(k, i))*by(:, k, i)
             gain(k, k, i) = gain(k, k, i) - self%hold(k, i)
@@ -266,7 +266,7 @@ contains
             end do
          end associate
       end do
-   end subroutine find_slope
+   end subroutine contact_problem_slope
 
    !> By which part of its W row `k` of contact `i` is stiffer in a step.
    pure real(wp) function proximal_part(self, i, k) result(part)

@@ -5,7 +5,7 @@
 module emcon_contact_trials
    use emcon_contact_problem, only : contact_effort_t, contact_problem_map, &
       contact_problem_missed, contact_problem_missed_by, contact_problem_row_sizes, &
-      contact_problem_t, met
+      contact_problem_slope, contact_problem_t, met
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_lu, dense_lu_solve, dense_lu_t
    implicit none
@@ -38,7 +38,10 @@ module emcon_contact_trials
 
    !> What the map grows by at a trial, factorised.
    type :: contact_slope_t
+      !> It was made of the W, c and stiffness of the problem to come
+      logical :: stays = .false.
       logical, private :: is_known = .false.
+      real(wp), allocatable, private :: by(:, :, :)  !! of `contact_problem_map` it was made of
       logical, allocatable, private :: pushes(:)     !! (rows) of a place that pushes or holds
       integer, allocatable, private :: row(:)        !! numbers of these
       real(dp), allocatable, private :: by_other(:, :)   !! (these, others)
@@ -75,7 +78,8 @@ contains
       logical, intent(out) :: is_solved
       type(contact_slope_t), intent(inout) :: slope
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
-      real(wp) :: part, before, largest, row_size(0:self%n_slip, size(self%mu))
+      real(wp) :: part, before, largest, row_size(0:self%n_slip, size(self%mu)), &
+         by(0:self%n_slip, 0:self%n_slip, size(self%mu))
       integer :: i, halving, n_stall
       logical :: is_singular, was_solved, gains
 
@@ -83,7 +87,7 @@ contains
       is_solved = .false.
       n_stall = 0
       row_size = contact_problem_row_sizes(self)
-      call contact_problem_map(self, trial, defect, largest=largest)
+      call contact_problem_map(self, trial, defect, by, largest)
       do i = 0, most
          was_solved = is_solved
          is_solved = is_met(self, trial, defect, row_size, largest)
@@ -91,15 +95,15 @@ contains
          if ((is_solved .and. (was_solved .or. .not. maxval(abs(defect)) > 0.0_wp)) &
             .or. i == most) exit
          n_trial = n_trial + 1
-         call step_again(self, slope, trial, defect, largest, gains)
+         call step_again(self, slope, trial, defect, by, largest, gains)
          if (gains) cycle
-         call find_step(self, trial, defect, slope, step, is_singular)
+         call find_step(self, by, defect, slope, step, is_singular)
          if (is_singular) exit
          before = norm2(defect)
          part = 1.0_wp
          do halving = 0, most_halvings
             new = trial + part*step
-            call contact_problem_map(self, new, defect, largest=largest)
+            call contact_problem_map(self, new, defect, by, largest)
             if (norm2(defect) <= (1.0_wp - least_gain*part)*before) exit
             part = 0.5_wp*part
          end do
@@ -126,14 +130,15 @@ contains
    end function is_met
 
    !> A step by what the map grew by at another trial. It is taken only if it gains.
-   subroutine step_again(self, slope, trial, defect, largest, gains)
+   subroutine step_again(self, slope, trial, defect, by, largest, gains)
       type(contact_problem_t), intent(in) :: self
       type(contact_slope_t), intent(in) :: slope
       real(wp), intent(inout) :: trial(0:, :)        !! (0:n_slip, n) [M L/T^2]
       real(wp), intent(inout) :: defect(0:, :)       !! (0:n_slip, n) its map [M L/T^2]
+      real(wp), intent(inout) :: by(0:, 0:, :)       !! as of `contact_problem_map`
       real(wp), intent(inout) :: largest             !! force there [M L/T^2]
       logical, intent(out) :: gains
-      real(wp) :: largest_new
+      real(wp) :: largest_new, by_new(0:self%n_slip, 0:self%n_slip, size(self%mu))
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: new, left
       real(dp) :: x(size(trial))
 
@@ -142,44 +147,63 @@ contains
       if (size(slope%pushes) /= size(trial)) return
       call solve_step(slope, reshape(real(-defect, dp), [size(trial)]), x)
       new = trial + reshape(real(x, wp), shape(trial))
-      call contact_problem_map(self, new, left, largest=largest_new)
+      call contact_problem_map(self, new, left, by_new, largest_new)
       gains = norm2(left) <= gain_again*norm2(defect)
       if (.not. gains) return
       trial = new
       defect = left
+      by = by_new
       largest = largest_new
    end subroutine step_again
 
-   !> The step of Newton's method. Rows of what neither pushes nor holds are those of the unit
-   !> matrix: they are left out of the elimination.
-   subroutine find_step(self, trial, defect, slope, step, is_singular)
+   !> The step of Newton's method, by the slope there is if that is of the same places pushing.
+   subroutine find_step(self, by, defect, slope, step, is_singular)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: trial(0:, :), defect(0:, :)    !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: by(0:, 0:, :)          !! as of `contact_problem_map`
+      real(wp), intent(in) :: defect(0:, :)          !! (0:n_slip, n) [M L/T^2]
       type(contact_slope_t), intent(inout) :: slope
       real(wp), intent(out) :: step(0:, :)           !! (0:n_slip, n) [M L/T^2]
       logical, intent(out) :: is_singular            !! then there is none
-      real(dp) :: full(size(trial), size(trial)), x(size(trial))
-      real(wp) :: again(0:self%n_slip, size(self%mu))
-      logical :: pushes(size(trial))
-      integer :: j
+      real(dp) :: x(size(defect))
+      logical :: does
 
-      call contact_problem_map(self, trial, again, full)
-      pushes = .false.
-      do j = 1, size(x)
-         pushes(:j - 1) = pushes(:j - 1) .or. abs(full(:j - 1, j)) > 0.0_dp
-         pushes(j + 1:) = pushes(j + 1:) .or. abs(full(j + 1:, j)) > 0.0_dp
-         pushes(j) = pushes(j) .or. abs(full(j, j) - 1.0_dp) > 0.0_dp
-      end do
-      slope%pushes = pushes
-      slope%row = pack([(j, j = 1, size(x))], pushes)
-      slope%by_other = full(slope%row, pack([(j, j = 1, size(x))], .not. pushes))
-      call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
-      slope%is_known = .not. is_singular
+      does = slope%stays .and. slope%is_known
+      if (does) does = all(shape(by) == shape(slope%by))
+      if (does) does = .not. any(abs(by - slope%by) > 0.0_wp)
+      if (.not. does) call find_slope(self, by, slope)
+      is_singular = .not. slope%is_known
       step = 0.0_wp
       if (is_singular) return
       call solve_step(slope, reshape(real(-defect, dp), [size(x)]), x)
       step = reshape(real(x, wp), shape(step))
    end subroutine find_step
+
+   !> What the map grows by. Rows of what neither pushes nor holds are those of the unit matrix:
+   !> they are left out of the elimination.
+   subroutine find_slope(self, by, slope)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: by(0:, 0:, :)          !! as of `contact_problem_map`
+      type(contact_slope_t), intent(inout) :: slope  !! not known: it is singular
+      real(dp), allocatable :: full(:, :)
+      logical :: pushes(size(self%w, 1)), is_singular
+      integer :: j
+
+      allocate(full(size(pushes), size(pushes)))
+      call contact_problem_slope(self, by, full)
+      pushes = .false.
+      do j = 1, size(pushes)
+         pushes(:j - 1) = pushes(:j - 1) .or. abs(full(:j - 1, j)) > 0.0_dp
+         pushes(j + 1:) = pushes(j + 1:) .or. abs(full(j + 1:, j)) > 0.0_dp
+         pushes(j) = pushes(j) .or. abs(full(j, j) - 1.0_dp) > 0.0_dp
+      end do
+      slope%pushes = pushes
+      slope%row = pack([(j, j = 1, size(pushes))], pushes)
+      slope%by_other = full(slope%row, pack([(j, j = 1, size(pushes))], .not. pushes))
+      call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
+      slope%is_known = .not. is_singular
+      slope%stays = slope%is_known
+      slope%by = by
+   end subroutine find_slope
 
    !> x of slope x = b.
    subroutine solve_step(slope, b, x)
@@ -314,16 +338,17 @@ contains
       integer, intent(out) :: n_step
       logical, intent(out) :: has_ended              !! the law is met
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: defect, step
-      real(wp) :: largest, row_size(0:self%n_slip, size(self%mu))
+      real(wp) :: largest, row_size(0:self%n_slip, size(self%mu)), &
+         by(0:self%n_slip, 0:self%n_slip, size(self%mu))
       type(contact_slope_t) :: slope
       logical :: is_singular
 
       row_size = contact_problem_row_sizes(self)
       do n_step = 0, most_steps
-         call contact_problem_map(self, push, defect, largest=largest)
+         call contact_problem_map(self, push, defect, by, largest)
          has_ended = is_met(self, push, defect, row_size, largest)
          if (has_ended .or. n_step == most_steps .or. .not. largest < limit) exit
-         call find_step(self, push, defect, slope, step, is_singular)
+         call find_step(self, by, defect, slope, step, is_singular)
          if (is_singular) exit
          push = push + step
       end do
