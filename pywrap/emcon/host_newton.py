@@ -47,7 +47,8 @@ class HostNewton:
             if size <= 4*_EPSILON*reach or last <= size < 1e-10*reach:
                 return du, lam, *sizes
             last = size
-        raise AnalysisError(f"Newton's method still moves by {size:g}: try a smaller step")
+        raise AnalysisError(f"Newton's method does not converge: its last correction is {size:g}; "
+                            "try a smaller step")
 
     # ---- all candidates: condensed to their rows -------------------------------------------------
 
@@ -87,8 +88,8 @@ class HostNewton:
                              "are held are those given to prepare")
         space = face.null_space()
         if len(space.redundant):
-            raise AnalysisError(f"the contacts {rows.contact[space.redundant]} follow from others: "
-                                f"solve with together=True")
+            raise AnalysisError(f"the contacts {rows.contact[space.redundant]} are redundant: "
+                                "solve with together=True")
         lam = face.multipliers(residual.reshape(self.u0.shape))
         matrix = _less(tangent, face.curvature(lam))
         part = face.particular(rows.defect).ravel()

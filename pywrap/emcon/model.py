@@ -409,7 +409,7 @@ class Model(Source):
         if damping is None and tangent_fraction is not None:
             raise InputError("tangent_fraction is a part of damping: give damping too")
         if friction is None and friction_restitution is not None:
-            raise InputError("friction_restitution is of what sticks: give friction too")
+            raise InputError("friction_restitution is for pairs with friction: give friction too")
         text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness,
                                             "RESTITUTION": restitution})
         kind, *values = pressure or ("HARD",)

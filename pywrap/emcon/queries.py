@@ -268,8 +268,8 @@ def _null_space(address: int) -> tuple[Any, ...]:
     """The status, and P and DF."""
     status, p, df, n, _ = _core.emcon_null_space(address)
     if n and not status:
-        raise AnalysisError("there is no null space: some of the constraints that act follow from "
-                            "others")
+        raise AnalysisError("there is no null space: some of the constraints that act are "
+                            "redundant")
     return (status,) if status else (0, (matrix(p), matrix(df)))
 
 

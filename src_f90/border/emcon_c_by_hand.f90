@@ -183,7 +183,7 @@ contains
       if (status /= err_none) return
       call query_null_space(model%query, model%p, model%df, place, error)
       if (size(place) > 0 .and. .not. c_associated(n_redundant)) call raise(error, err_analysis, &
-         "there is no null space: some of the constraints that act follow from others")
+         "there is no null space: some of the constraints that act are redundant")
       call put_matrix(model%p, p)
       call put_matrix(model%df, df)
       call put_number(size(place), n_redundant)

@@ -207,8 +207,8 @@ def test_refusals(program: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("TYPE=USER", "TYPE=SEGMENT", "TYPE=SEGMENT is for plane models"),
-    ("TYPE=USER", "TYPE=USER, ADJUST=0.1", "ADJUST is not for TYPE=USER"),
-    ("TYPE=USER", "TYPE=USER, GUARD=YES", "GUARD=YES is not for TYPE=USER"),
+    ("TYPE=USER", "TYPE=USER, ADJUST=0.1", "ADJUST does not work with TYPE=USER"),
+    ("TYPE=USER", "TYPE=USER, GUARD=YES", "GUARD=YES does not work with TYPE=USER"),
     ("TYPE=USER", "TYPE=USER, SIDES=BOTH", "the program that gives TYPE=USER decides"),
     ("NAME=HARD\n", "NAME=HARD, PAD THICKNESS=0.1\n", "PAD THICKNESS of its surface interaction"),
     ("NAME=HARD\n", "NAME=HARD\n*FRICTION\n0.1\n", "*FRICTION of its surface interaction")])
