@@ -46,7 +46,7 @@ contains
          character(len=*), intent(in) :: name, pattern
          real(dp), intent(in) :: bytes
 
-         call row_put(row, name, 0.01_wp*anint(100.0_dp*bytes/megabyte), pattern)
+         call row_put(row, name, 0.01_wp*real(anint(100.0_dp*bytes/megabyte), wp), pattern)
       end subroutine put
 
    end subroutine memory_report

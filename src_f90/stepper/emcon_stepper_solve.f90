@@ -71,8 +71,9 @@ contains
       integer :: outcome
 
       call query_begin_contact(self, stepper, u0, du, active, acts, error)
-      if (present(stop) .and. .not. allocated(error)) &
+      if (present(stop) .and. .not. allocated(error)) then
          call query_begin_friction(self, stepper, stop, error)
+      end if
       if (present(h) .and. .not. allocated(error)) call query_begin_damping(self, stepper, h, error)
       if (allocated(error)) return
       call check_that(allocated(self%map) .or. self%march%system%first_constraint(1) == 0, &

@@ -1,5 +1,5 @@
-!> A step of a host by one call: against its own loop over sets of contacts, with friction, damping, a
-!> map and ties; failures.
+!> A step of a host by one call: against its own loop over sets of contacts, with friction,
+!> damping, a map and ties; failures.
 module test_host_step
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_csr, only : csr_from_values, csr_t
@@ -126,7 +126,8 @@ contains
       real(wp), intent(inout) :: lost            !! grows [M L^2/T^2]
       type(error_t), allocatable, intent(out) :: error
       logical, intent(in) :: has_stop
-      real(wp), allocatable :: du(:, :), stop(:, :), lam(:), slip(:, :), friction(:, :), force(:, :)
+      real(wp), allocatable :: du(:, :), stop(:, :), lam(:)
+      real(wp), allocatable :: slip(:, :), friction(:, :), force(:, :)
       real(wp) :: damped
       integer, allocatable :: way(:)
       logical, allocatable :: active(:)
@@ -135,12 +136,12 @@ contains
          allocate(du, source=h*truss%v)
          if (has_stop) stop = 0.5_wp*du
          active = truss%is_active
-         call query_solve_step(face%query, face%stepper, truss%u, du, active, lam, solver, error, &
-            stop, h)
+         call query_solve_step(face%query, face%stepper, truss%u, du, active, lam, solver, &
+            error, stop, h)
          if (.not. allocated(error)) call query_slips(face%query, face%stepper, way, slip, &
             friction, error)
-         if (.not. allocated(error)) call query_law_forces(face%query, face%stepper, force, damped, &
-            error)
+         if (.not. allocated(error)) call query_law_forces(face%query, face%stepper, force, &
+            damped, error)
          if (allocated(error)) return
          lost = lost + sum(slip*friction) + damped
          truss%is_active = active
@@ -201,15 +202,18 @@ contains
             do k = 1, n_step
                call advance(solver, face, lost, error, .true.)
                if (allocated(error)) return
-               call check_near(error, truss_energy(solver%truss) + lost, energy, drift, energy, "energy")
-               call check_near(error, truss_momentum(solver%truss), momentum, drift, energy, "momenta")
+               call check_near(error, truss_energy(solver%truss) + lost, energy, drift, energy, &
+                  "energy")
+               call check_near(error, truss_momentum(solver%truss), momentum, drift, energy, &
+                  "momenta")
             end do
             call check_true(error, lost > 0.01_wp*energy, "they have rubbed")
          end do
       end do
    end subroutine test_losses
 
-   !> Unknowns in another order and of another size: the same steps. Of tied bodies those of the links.
+   !> Unknowns in another order and of another size: the same steps. Of tied bodies those of the
+   !> links.
    subroutine test_map(error)
       type(error_t), allocatable, intent(out) :: error
       type(solver_t) :: solver, mapped
@@ -226,7 +230,7 @@ contains
       n = size(mapped%truss%x)
       allocate(mapped%map)
       call csr_from_values(mapped%map, n, n, [(k, k = 1, n)], [(n + 1 - k, k = 1, n)], &
-         [(2.0_dp + 0.1_dp*real(k, dp), k = 1, n)])
+         [(2.0_wp + 0.1_wp*real(k, wp), k = 1, n)])
       call query_set_map(face_there%query, face_there%stepper, mapped%map, error)
       if (allocated(error)) return
       lost = 0.0_wp
@@ -241,8 +245,8 @@ contains
       call check_near(error, lost, lost_there, drift, 1.0_wp, "what friction takes")
 
       call lay_out(solver, face, master, slave, error)
-      if (.not. allocated(error)) call stepper_add_tie(face%stepper, slave, master, multiplier_dual, &
-         1.0_wp, error)
+      if (.not. allocated(error)) call stepper_add_tie(face%stepper, slave, master, &
+         multiplier_dual, 1.0_wp, error)
       if (.not. allocated(error)) call build(solver, face, error)
       allocate(solver%map)
       if (.not. allocated(error)) call query_links(face%stepper, solver%map, error)
@@ -256,7 +260,7 @@ contains
          do k = 1, n_step
             call advance(solver, face, lost, error, .false.)
             if (allocated(error)) return
-            call check_near(error, truss_energy(truss), energy, drift, energy, "energy of tied bodies")
+            call check_near(error, truss_energy(truss), energy, drift, energy, "tied bodies")
          end do
          call check_true(error, maxval(abs(truss%u)) > 0.1_wp, "they have moved")
       end associate
@@ -278,25 +282,27 @@ contains
       if (allocated(error)) return
       du = h*solver%truss%v
       active = solver%truss%is_active
-      call query_solve_step(face%query, face%stepper, solver%truss%u, du, active, lam, solver, refused)
+      call query_solve_step(face%query, face%stepper, solver%truss%u, du, active, lam, solver, &
+         refused)
       call check_error(error, refused, err_input, "the size of the step is to be told", "damping")
       solver%fails = .true.
-      call query_solve_step(face%query, face%stepper, solver%truss%u, du, active, lam, solver, refused, &
-         h=h)
+      call query_solve_step(face%query, face%stepper, solver%truss%u, du, active, lam, solver, &
+         refused, h=h)
       call check_error(error, refused, err_analysis, "the host gives up", "the solver")
       call check_true(error, all(abs(du - h*solver%truss%v) <= 0.0_wp) .and. .not. any(active), &
          "what was given")
-      call query_solve_step(face%query, face%stepper, solver%truss%u, du(:, 2:), active, lam, solver, &
-         refused, h=h)
+      call query_solve_step(face%query, face%stepper, solver%truss%u, du(:, 2:), active, lam, &
+         solver, refused, h=h)
       call check_error(error, refused, err_input, "du is to have 2 components at each of 16", "du")
 
       call lay_out(solver, face, master, slave, error)
-      if (.not. allocated(error)) call stepper_add_tie(face%stepper, slave, master, multiplier_dual, &
-         1.0_wp, error)
+      if (.not. allocated(error)) call stepper_add_tie(face%stepper, slave, master, &
+         multiplier_dual, 1.0_wp, error)
       if (.not. allocated(error)) call build(solver, face, error)
       if (allocated(error)) return
-      call query_solve_step(face%query, face%stepper, solver%truss%u, du, solver%truss%is_active, lam, &
-         solver, refused)
+      active = solver%truss%is_active
+      call query_solve_step(face%query, face%stepper, solver%truss%u, du, active, lam, solver, &
+         refused)
       call check_error(error, refused, err_input, "surfaces are tied: set the map", "ties")
    end subroutine test_failures
 

@@ -1,4 +1,4 @@
-!> Point masses and bars for the tests of hosts, with a dense Newton step in the null space of contact.
+!> Point masses and bars for tests of hosts, with a dense Newton step in the null space of contact.
 !>
 !> The strain of a bar, (l^2 - L^2)/(2 L^2), is quadratic in the positions, so the mean of its
 !> values at both ends of a step, with the direction at the middle, is a discrete gradient of
@@ -20,7 +20,8 @@ module truss_host
    implicit none
    private
    public :: face_t, face_new, face_build, face_n
-   public :: truss_t, truss_begin, truss_add, truss_respond, truss_step, truss_energy, truss_momentum
+   public :: truss_t, truss_begin, truss_add, truss_respond, truss_step
+   public :: truss_energy, truss_momentum
 
    !> A model of the host's nodes, and what it is asked.
    type :: face_t
