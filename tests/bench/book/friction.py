@@ -30,6 +30,20 @@ from friction_space_scenes import Ball, belt
 from plain_scenes import BOTH, ONE
 from plate_alone import displacements
 from scene_tools import PROGRAM, Deck, Run
+from test_friction_space import (
+    CARDS_NEED,
+    CORE,
+    GRAVITY,
+    ball_on_floor,
+    billiard_balls,
+    cards,
+    inertia,
+    on_floor,
+    sliding_puck,
+    slows_down,
+    turns_away,
+)
+from test_friction_space import arch as space_arch
 
 from .common import Chapter, drift, size, table
 
@@ -312,7 +326,7 @@ def report_ring(started, _):
 
 # ---- in space -----------------------------------------------------------------------------------
 
-BELTS = [(12, .02), (24, .02), (12, .002), (24, .002)]
+BELTS = [(12, .02), (24, .02), (48, .02), (12, .002), (24, .002)]
 BALLS = (2, 3, 4)
 
 
@@ -359,11 +373,97 @@ def report_space(started, _):
                   "cuts", "law"], rows)
 
 
+#: The last one is the reference of the others.
+PUCKS = (.01, .005, .00125)
+
+
+def start_space_known(runs):
+    texts = {}
+    for mu in (.49, .5):
+        texts["slope", mu] = on_floor(mu, .01, .2, (0, 0, 0), slope=math.atan(.5))
+    for h in (.02, .01):
+        texts["turning", h] = on_floor(.3, h, .3, (0, 1., 0), slope=.2)
+    for h in PUCKS:
+        texts["puck", h] = sliding_puck(h, 1.0)
+    texts["puck ends", .01] = sliding_puck(.01, 1.7)
+    texts["rolling", .3] = ball_on_floor(.3, .01, 16, v=1.)
+    for mu in (.1, .3):
+        texts["down", mu] = ball_on_floor(mu, .005, 12, slope=math.radians(30))
+    for mu in (.06, .5):
+        texts["throw", mu] = billiard_balls(mu, .001)[1]
+    for mu in (.2, .97*CARDS_NEED, 1.03*CARDS_NEED, .5):
+        texts["cards", mu] = cards(mu)
+    for part in (.97, 1.03):
+        texts["arch", part] = space_arch(part*arch_needs())
+    for mu in (.3, .8):
+        texts["slab", mu] = on_floor(mu, .01, .5, (1., .2, 0), (0, 0, 1.), is_rigid=False)
+    return {key: runs.start(Deck(text, key[0])) for key, text in texts.items()}
+
+
+def report_space_known(started, _):
+    run = {key: future.result() for key, future in started.items()}
+    pull, until = GRAVITY*math.sin(math.radians(30)), .2
+    rows = []
+
+    def add(scene, known, here, *of):
+        rows.append((scene, known, here, f"{sum(int(r.history['cuts'].sum()) for r in of)}",
+                     size(max(r.verdict["law_violation"] for r in of))))
+
+    for mu in (.49, .5):
+        r, angle = run["slope", mu], math.atan(.5)
+        add(f"rigid slab on a slope of 1 in 2, mu = {mu}: acceleration",
+            f"{max(0., math.sin(angle) - mu*math.cos(angle))*GRAVITY:.9f}", f"{abs(r.history['px'][-1])/.5/.2:.9f}", r)
+    wanted = turns_away(.2, .3, .3)
+    of = [run["turning", h] for h in (.02, .01)]
+    error = [max(abs(r.history[name][-1]/.5 - w) for name, w in zip(("px", "py"), wanted)) for r in of]
+    add("the same thrown across a slope, h = 0.02, 0.01: error of the velocity by a particle's", "order 2",
+        ", ".join(f"{e:.1e}" for e in error), *of)
+    of = [run["puck", h] for h in PUCKS]
+    first = of[0].history
+    last = [np.array([r.history[name][-1] for name in ("px", "py", "lz")])/first["px"][0] for r in of]
+    add("puck of eight nodes that slides and spins, h = 0.01, 0.005: momenta by those of h = 0.00125", "order 2",
+        ", ".join(f"{np.abs(p - last[2]).max():.1e}" for p in last[:2]), *of)
+    wanted = slows_down(1.0, first["lz"][0]/first["px"][0]/2)
+    add("the same, h = 0.00125: momenta by the equations of a flat one; its weight is 5e-4 of its radius above the floor",
+        "below 1e-4", f"{np.abs(last[2] - wanted).max():.1e}", of[2])
+    r = run["puck ends", .01]
+    ends = [r.history["time"][np.argmax(np.abs(r.history[name]) < 1e-6*r.history[name][0])] for name in ("px", "lz")]
+    add("the same: where it stops, where its spin does", "one time", ", ".join(f"{t:.2f}" for t in ends), r)
+    r = run["rolling", .3]
+    add("ball thrown along a floor of elements of 0.02: velocity as it rolls", "0.714286",
+        f"{r.history['px'][-1]/CORE**3:.6f}", r)
+    for mu in (.1, .3):
+        r = run["down", mu]
+        known = 5/7*pull if mu > .165 else pull - mu*GRAVITY*math.cos(math.radians(30))
+        add(f"ball on a slope of 30 degrees, mu = {mu}: acceleration", f"{known:.4f}",
+            f"{r.history['px'][-1]/CORE**3/until:.4f}", r)
+    for mu in (.06, .5):
+        r, hit = run["throw", mu], billiard_balls(mu, .001)[0]
+        (m, turns), (n, spins) = inertia(hit), (CORE**3, .4*CORE**3)
+        stopped = math.tan(math.radians(30))*(1/m + 1/n)/2/(1/m + 1/turns + 1/n + 1/spins)
+        way = np.diff(r.fields()["displacement"][-2:, :len(hit.x)].mean(1), axis=0)[0]
+        add(f"ball hit at a cut of 30 degrees, mu = {mu}: throw in degrees, to 0.014",
+            f"{math.degrees(math.atan(min(mu, stopped))):.3f}", f"{math.degrees(math.atan2(way[1], way[0])):.3f}", r)
+    for name, needs in (("cards", CARDS_NEED), ("arch", arch_needs())):
+        for (scene, value), r in run.items():
+            if scene == name:
+                mu = value if name == "cards" else value*needs
+                what = "two cards leaning by 30 degrees" if name == "cards" else "arch of five stones"
+                add(f"{what}, mu = {mu:.4f} of {needs:.4f}: moved", "0" if mu > needs else "falls",
+                    size(np.abs(r.fields()["displacement"][-1]).max()), r)
+    for mu in (.3, .8):
+        r = run["slab", mu]
+        add(f"elastic slab thrown with a spin, to its stop, mu = {mu}: error of the energy, least loss in an increment",
+            "0, >= 0", f"{size(balance(r.history))}, {size(np.diff(r.history['friction_loss']).min())}", r)
+    return table(["scene", "known", "here", "cuts", "law"], rows)
+
+
 CHAPTERS = [Chapter("friction_rest", start_rest, report_rest),
             Chapter("friction_known", start_known, report_known),
             Chapter("friction_curves", start_curves, report_curves),
             Chapter("friction_flutter", start_flutter, report_flutter),
             Chapter("friction_held", start_held, report_held),
             Chapter("friction_space", start_space, report_space),
+            Chapter("friction_space_known", start_space_known, report_space_known),
             Chapter("friction_random", start_random, report_random),
             Chapter("friction_ring", start_ring, report_ring)]
