@@ -125,6 +125,10 @@ contains
          self%n_operation/dense_gain/step)))
       if (self%iterates) then
          call self%direct%free()
+         if (allocated(self%near_null)) then
+            if (size(self%near_null, 1) == matrix%n_row) call self%iterative%take_modes( &
+               self%near_null)
+         end if
       else
          call self%iterative%free()
          call analyse_direct(self, matrix, error)

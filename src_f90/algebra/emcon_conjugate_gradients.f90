@@ -22,9 +22,11 @@ module emcon_conjugate_gradients
 contains
 
    !> A solve begins with the residual r = b - A x, and z = M^-1 r.
-   pure subroutine gradients_begin(self, r, z)
+   pure subroutine gradients_begin(self, r, z, found)
       type(gradients_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: r(:), z(:)     !! (n)
+      !> The energy x.A x of where it begins, if r is orthogonal to that: a part of the solution's
+      real(dp), intent(in), optional :: found
 
       if (allocated(self%direction)) then
          if (size(self%direction) /= size(r)) deallocate(self%direction)
@@ -34,6 +36,7 @@ contains
       self%n = 0
       self%square = product_of(r, z)
       self%first = self%square
+      if (present(found)) self%first = self%first + found
       self%is_definite = self%square >= 0.0_dp
    end subroutine gradients_begin
 

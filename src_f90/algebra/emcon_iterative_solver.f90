@@ -8,6 +8,8 @@
 module emcon_iterative_solver
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use, intrinsic :: iso_fortran_env, only : sp => real32
+   use emcon_coarse_modes, only : coarse_modes_begin, coarse_modes_complete, &
+      coarse_modes_factorise, coarse_modes_init, coarse_modes_t
    use emcon_conjugate_gradients, only : gradients_are_done, gradients_begin, gradients_move, &
       gradients_t, gradients_turn
    use emcon_csr, only : csr_find, csr_t
@@ -41,11 +43,13 @@ module emcon_iterative_solver
       logical, private :: is_sound = .false.     !! those that were taken so far can be factorised
       type(node_blocks_t), private :: blocks     !! half_scale times the matrix
       type(incomplete_cholesky_t), private :: factor
+      type(coarse_modes_t), allocatable, private :: coarse   !! of `take_modes`, for `solve`
       integer, private :: first_slot = 0         !! of the entry (1, 1); 0: not there
       type(gradients_t), private :: gradients
       real(dp), allocatable, private :: x(:), r(:), z(:)     !! vectors of blocks
    contains
       procedure :: analyse => iterative_analyse
+      procedure :: take_modes => iterative_take_modes
       procedure :: factorise => iterative_factorise
       procedure :: take_row => iterative_take_row
       procedure :: factorise_rows => iterative_factorise_rows
@@ -73,6 +77,15 @@ contains
          allocate(self%x(n), self%r(n), self%z(n), source=0.0_dp)
       end associate
    end subroutine iterative_analyse
+
+   !> Solutions of the pattern are to be found by a coarse space of these motions, too.
+   subroutine iterative_take_modes(self, mode)
+      class(iterative_solver_t), intent(inout) :: self   !! analysed
+      real(dp), intent(in) :: mode(:, :)                 !! (n, >= 1)
+
+      if (.not. allocated(self%coarse)) allocate(self%coarse)
+      call coarse_modes_init(self%coarse, self%blocks, mode)
+   end subroutine iterative_take_modes
 
    subroutine iterative_factorise(self, value, error)
       class(iterative_solver_t), intent(inout) :: self
@@ -136,15 +149,17 @@ contains
       self%is_filled = .true.
       call incomplete_cholesky_factorise(self%factor, self%blocks, is_definite)
       self%is_singular = .not. is_definite
+      if (is_definite .and. allocated(self%coarse)) call coarse_modes_factorise(self%coarse, &
+         self%blocks)
    end subroutine iterative_factorise_rows
 
-   !> Steps until the residual is small enough, from x = 0.
+   !> Steps until the residual is small enough, from x = 0, or from the coarse solution.
    subroutine iterative_solve(self, rhs, x, error)
       class(iterative_solver_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: rhs(:)
       real(wp), intent(out), contiguous :: x(:)
       type(error_t), allocatable, intent(out) :: error
-      real(dp) :: accuracy
+      real(dp) :: accuracy, found
 
       if (self%is_singular .or. .not. self%is_filled) then
          call raise(error, err_internal, "iterative_solve: there is no factorisation")
@@ -153,9 +168,15 @@ contains
       accuracy = max(self%accuracy, best_accuracy)
       self%x = 0.0_dp
       self%r(self%blocks%place) = self%half_scale*real(rhs, dp)
+      found = 0.0_dp
+      if (has_coarse(self)) then
+         call coarse_modes_begin(self%coarse, self%r, self%x, found)
+         call node_blocks_multiply(self%blocks, self%x, self%z)
+         self%r = self%r - self%z
+      end if
       self%z = self%r
       call precondition(self, self%z)
-      call gradients_begin(self%gradients, self%r, self%z)
+      call gradients_begin(self%gradients, self%r, self%z, found)
       do
          self%is_converged = gradients_are_done(self%gradients, accuracy)
          if (self%is_converged .or. .not. self%gradients%is_definite &
@@ -171,13 +192,22 @@ contains
       x = real(self%x(self%blocks%place), wp)
    end subroutine iterative_solve
 
-   !> z = (L L^T)^-1 z
+   !> Is there a coarse space to solve by?
+   pure logical function has_coarse(self)
+      type(iterative_solver_t), intent(in) :: self
+
+      has_coarse = allocated(self%coarse)
+      if (has_coarse) has_coarse = self%coarse%is_made
+   end function has_coarse
+
+   !> z = (L L^T)^-1 z of the present residual, completed by the coarse space.
    subroutine precondition(self, z)
       type(iterative_solver_t), intent(in) :: self
       real(dp), intent(inout), contiguous :: z(:)        !! a vector of blocks
 
       call incomplete_cholesky_forward(self%factor, self%blocks, z)
       call incomplete_cholesky_backward(self%factor, self%blocks, z)
+      if (has_coarse(self)) call coarse_modes_complete(self%coarse, self%r, z)
    end subroutine precondition
 
    !> (L^-1 or L^-T) rhs
@@ -224,6 +254,7 @@ contains
 
       self%blocks = node_blocks_t()
       self%factor = incomplete_cholesky_t()
+      if (allocated(self%coarse)) deallocate(self%coarse)
       self%is_filled = .false.
       self%is_singular = .false.
       if (allocated(self%x)) deallocate(self%x, self%r, self%z)

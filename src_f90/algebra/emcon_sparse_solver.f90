@@ -47,6 +47,9 @@ module emcon_sparse_solver
       logical :: is_incomplete = .false.
       !> Set before `analyse`, with `accuracy`: iterations take about as many steps on any mesh
       logical :: is_even = .false.
+      !> (n, any) Set before `analyse`, with `accuracy`, or not allocated: motions that take hardly
+      !> any energy, as those of a rigid body: parts of them are the coarse space of iterations
+      real(dp), allocatable :: near_null(:, :)
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
       integer, private :: of_analysis = 0     !! `n_analysis` when `factored` was factorised
       real(dp), allocatable, private :: factored(:)      !! values of the last `solver_renew`

@@ -2,7 +2,7 @@
 !> moves is held.
 module emcon_march_begin
    use emcon_active_set, only : active_set_overclosure, active_set_suit, active_set_t
-   use emcon_correction, only : correction_reset
+   use emcon_correction, only : correction_reset, correction_take_modes
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
@@ -33,6 +33,7 @@ module emcon_march_begin
    use emcon_overclosure, only : overclosure_follow_arcs
    use emcon_evaluation, only : evaluation_at_end
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
+   use emcon_rigid_modes, only : rigid_modes
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_user
    use emcon_penalty, only : penalty_begin_step, penalty_free, penalty_start
@@ -235,6 +236,8 @@ contains
             scene%x, step%solution%newton_tolerance, step%solution%newton_maximum)
          self%newton%convergence%polishes = step%solution%polishes
          call choose_solver(self, step)
+         if (.not. step_is_dynamic(step)) call correction_take_modes(self%newton%correction, &
+            rigid_modes(self%system%space%numbering, scene%x))
          state%base = factor_base_t()
          self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &
             step_is_dynamic(step)

@@ -25,7 +25,7 @@ module emcon_correction
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
       correction_try_minimum, correction_is_lost, &
       correction_multipliers, correction_reset, correction_free, correction_reason, &
-      correction_ticks, correction_work
+      correction_take_modes, correction_ticks, correction_work
 
    !> Of a correction by Newton's method, where the solver iterates.
    real(dp), parameter :: newton_accuracy = 1.0e-4_dp
@@ -90,6 +90,14 @@ contains
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%user)
       call saddle_point_reset(self%saddle_point, self%choice, self%user)
    end subroutine make_solvers
+
+   !> Tell solvers of definite matrices which motions take hardly any energy.
+   pure subroutine correction_take_modes(self, mode)
+      type(correction_t), intent(inout) :: self  !! reset
+      real(dp), intent(in) :: mode(:, :)         !! (n_unknown, any)
+
+      self%definite_solver%near_null = mode
+   end subroutine correction_take_modes
 
    !> Free what the solvers hold.
    subroutine correction_free(self)

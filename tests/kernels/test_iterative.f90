@@ -37,6 +37,7 @@ contains
          test_case_t("products and entries of blocks", test_blocks), &
          test_case_t("without fill the factor is complete", test_complete), &
          test_case_t("as good as was asked for", test_accuracy), &
+         test_case_t("a coarse space", test_coarse), &
          test_case_t("both halves are the preconditioner", test_halves), &
          test_case_t("row by row or as a whole", test_rows), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
@@ -240,6 +241,77 @@ contains
       end do
       call solver%free()
    end subroutine test_accuracy
+
+   !> A long lattice with little mass: what moves it as a whole takes many steps, and few once its
+   !> rigid motions are known, in groups. One of them that comes twice changes nothing.
+   subroutine test_coarse(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_long = 60, n_mode = 7
+      real(dp), parameter :: accuracy = 1.0e-9_dp
+      type(iterative_solver_t) :: solver
+      type(csr_t) :: a
+      real(dp), allocatable :: mode(:, :)
+      real(wp), allocatable :: b(:), x(:), coarse(:), again(:)
+      integer :: n_step
+
+      call lattice(n_long, 3, 3, 1.0e-6_dp, a)
+      allocate(b(a%n_row), x(a%n_row), coarse(a%n_row), again(a%n_row), mode(a%n_row, n_mode))
+      call random_number(b)
+      call find_modes(n_long, 3, mode)
+      solver%accuracy = accuracy
+      call start(solver, a, error)
+      if (.not. allocated(error)) call solver%solve(b, x, error)
+      if (allocated(error)) return
+      n_step = solver%n_step
+      call solver%take_modes(mode)
+      call solver%factorise(a%value, error)
+      if (.not. allocated(error)) call solver%solve(b, coarse, error)
+      if (.not. allocated(error)) call solver%solve(b, again, error)
+      if (allocated(error)) return
+      call check_true(error, solver%is_converged .and. 3*solver%n_step < n_step, "fewer steps")
+      if (.not. allocated(error)) call check_true(error, energy(a, real(coarse - x, dp)) &
+         <= (10.0_dp*accuracy)**2*energy(a, real(x, dp)), "the same solution")
+      if (.not. allocated(error)) call check_true(error, .not. any(abs(again - coarse) > 0.0_wp), &
+         "the same bits again")
+      if (allocated(error)) return
+      ! A force that only moves groups as a whole is met at once.
+      call csr_multiply(a, real(mode(:, 1), wp), b)
+      call solver%solve(b, coarse, error)
+      if (allocated(error)) return
+      call check_true(error, solver%n_step == 0, "a motion of the coarse space takes no step")
+      if (.not. allocated(error)) call check_near(error, coarse, real(mode(:, 1), wp), &
+         real(rough_tol, wp), 1.0_wp, "and is found")
+   end subroutine test_coarse
+
+   !> Rigid motions of a lattice, the first translation twice.
+   pure subroutine find_modes(n_long, n_wide, mode)
+      integer, intent(in) :: n_long, n_wide
+      real(dp), intent(out) :: mode(:, :)        !! (n, 7)
+      real(dp) :: at(3), own(3, size(mode, 2))
+      integer :: b, n, p, q, m, row
+
+      mode = 0.0_dp
+      row = 0
+      b = 0
+      do while (row < size(mode, 1))
+         at = real([modulo(b, n_long), modulo(b/n_long, n_wide), b/(n_long*n_wide)], dp)
+         own = 0.0_dp
+         m = 3
+         do p = 1, 3
+            own(p, p) = 1.0_dp
+            do q = p + 1, 3
+               m = m + 1
+               own(p, m) = -at(q)
+               own(q, m) = at(p)
+            end do
+         end do
+         b = b + 1
+         n = merge(1, merge(2, 3, b <= 4), b <= 2)   ! unknowns of the first nodes, see `join`
+         mode(row + 1:row + n, :) = own(:n, :)
+         row = row + n
+      end do
+      mode(:, 7) = mode(:, 1)
+   end subroutine find_modes
 
    !> x.A x
    real(dp) function energy(a, x)
