@@ -77,9 +77,10 @@ contains
                allocate(contacts%slip_path(n), contacts%slid(n_slip + 1, n), source=0.0_wp)
                allocate(contacts%slides_along(n_slip, n), contacts%drag(n_slip, n), &
                   contacts%slip(n_slip, n), source=0.0_wp)
+               allocate(self%state%friction, source=self%state%contact)
             end associate
          else
-            allocate(contacts%slip_path(0), contacts%slid(0, 0))
+            allocate(contacts%slip_path(0), contacts%slid(0, 0), self%state%friction(0, 0))
             allocate(contacts%slides_along, contacts%drag, contacts%slip, &
                source=0.0_wp*friction%tau)
          end if

@@ -2,7 +2,7 @@
 module emcon_march_commit
    use emcon_constraint, only : condition_friction, most_slips
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_dissipated, &
-      constraints_force
+      constraints_force, constraints_friction
    use emcon_correction, only : correction_reason
    use emcon_contact_law, only : contact_laws_drag, loss_damping, loss_friction
    use emcon_errors, only : error_t
@@ -78,6 +78,7 @@ contains
          end if
          state%v = self%end_state%v
          state%contact = self%newton%contact
+         if (size(state%friction) > 0) call constraints_friction(set, state%friction)
          call record_pairs(self, scene, h)
          state%internal = self%end_state%force
          state%energy = self%end_state%energy

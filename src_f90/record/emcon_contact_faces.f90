@@ -1,7 +1,7 @@
 !> The faces of contact surfaces in space, and what contact does to each.
 !>
 !> A force on a node belongs to the faces there, whichever side of a pair it is on: so both sides of
-!> a pair show all of the pressure between them. Source: docs/theory.md, section 14.
+!> a pair show all of the pressure between them. Friction goes where pressure does. Source: docs/theory.md, section 14.
 module emcon_contact_faces
    use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use emcon_facet_values, only : facets_share
@@ -134,11 +134,14 @@ contains
       type(stepper_t), intent(inout) :: stepper
       type(face_values_t), intent(out) :: values
       real(dp), allocatable :: of_all(:, :)
-      real(wp), allocatable :: force(:, :), share(:, :), normal(:, :), push(:, :)
+      real(wp), allocatable :: force(:, :), pressed(:, :), share(:, :), normal(:, :), push(:, :)
       integer :: f, n
 
       allocate(of_all, source=contact_field(stepper, "CF"))
       force = real(of_all(:, self%node), wp)
+      pressed = force
+      if (size(stepper%march%state%friction) > 0) pressed = force &
+         - stepper%march%state%friction(:, self%node)
       associate (m => size(self%vertex, 2), n_dim => size(force, 1))
          allocate(normal(n_dim, m), push(n_dim, m), share(size(self%vertex, 1), m))
          allocate(values%pressure(1, m), values%at_node(1, size(self%node)), source=0.0_dp)
@@ -146,7 +149,7 @@ contains
       do f = 1, size(normal, 2)
          normal(:, f) = facets_normal(self%facets, f, stepper%scene%x, stepper%march%state%u)
       end do
-      call facets_share(self%vertex, normal, force, share)
+      call facets_share(self%vertex, normal, pressed, share)
       do f = 1, size(push, 2)
          n = count(self%vertex(:, f) > 0)
          associate (node => self%vertex(:n, f), square => dot_product(normal(:, f), normal(:, f)))

@@ -78,6 +78,8 @@ module emcon_state
       real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
       real(wp), allocatable :: u_start(:, :)     !! (n_dim, n_node) displacement at the step's start
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces
+      !> (n_dim, n_node) friction in them; without friction of no nodes
+      real(wp), allocatable :: friction(:, :)
       type(pair_record_t) :: pairs               !! what each contact pair transmits
       type(pair_sums_t) :: sums                  !! and has transmitted so far
       real(wp), allocatable :: reaction(:, :)    !! (n_dim, n_node) forces at prescribed freedoms

@@ -193,6 +193,11 @@ contains
          call restart_exchange(restart, "v", state%v)
          call restart_exchange(restart, "u_start", state%u_start)
          call restart_exchange(restart, "contact", state%contact)
+         if (restart_offers(restart, "friction", any(abs(state%friction) > 0.0_wp))) then
+            call restart_exchange(restart, "friction", state%friction)
+         else
+            state%friction = 0.0_wp
+         end if
          call restart_exchange(restart, "reaction", state%reaction)
          call restart_exchange(restart, "internal", state%internal)
          if (restart_offers(restart, "turned", size(state%turns%angle) > 0)) then

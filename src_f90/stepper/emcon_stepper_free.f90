@@ -212,6 +212,7 @@ contains
          next%energy = system%response%energy
          next%potential = system%response%potential
          next%contact = 0.0_wp
+         next%friction = 0.0_wp
          call march_past_forget(next)
          next%reaction = 0.0_wp
          call rigid_rotation_init(next%turns, self%scene%rigid, self%scene%x, next%u)

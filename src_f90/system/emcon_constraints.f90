@@ -20,8 +20,8 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_take_lam, constraints_normals, &
       constraints_gives_back
-   public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
-      constraints_dissipated
+   public :: constraints_friction, constraints_add_law_forces, constraints_add_row_forces, &
+      constraints_lam, constraints_dissipated
    public :: constraint_index, constraints_rounding, constraints_add_rounding
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
@@ -318,6 +318,19 @@ contains
             condition_drag(self%item(k), lam), force, magnitude)
       end do
    end subroutine constraints_force
+
+   !> Friction alone, of all conditions and laws, on all nodes.
+   pure subroutine constraints_friction(self, force)
+      type(constraint_set_t), intent(in) :: self
+      real(wp), intent(out), contiguous :: force(:, :)                   !! (n_dim, n_node)
+      integer :: k
+
+      call vector_zero(size(force), force)
+      do k = 1, self%n_condition
+         if (self%item(k)%has_friction) call add_force(self%item(k), 0.0_wp, &
+            condition_drag(self%item(k), constraints_lam(self, k)), force)
+      end do
+   end subroutine constraints_friction
 
    !> Add the forces of one condition by a push along its gap and friction against its slips.
    pure subroutine add_force(item, push, tau, force, magnitude)

@@ -38,11 +38,12 @@ def slab(cells: tuple[int, int, int] = (2, 2, 1), turn: float = 0.0) -> Block:
 
 
 def on_floor(mu: float, h: float, until: float, v: tuple, w: tuple = (0, 0, 0), slope: float = 0.0,
-             is_rigid: bool = True, cells: tuple[int, int, int] = (2, 2, 1)) -> str:
-    """A slab on a plane."""
+             is_rigid: bool = True, cells: tuple[int, int, int] = (2, 2, 1), is_whole: bool = False) -> str:
+    """A slab on a plane, its surface the lower side or the whole outline."""
     block = slab(cells)
     flies = rigid(1, block, v=v, w=w) if is_rigid else velocities(block, np.array(v, float), np.array(w, float))
-    return (bodies([block], [faces(block, 2, 0)], STIFF) + flies + walls.wall(walls.plane())
+    surface = faces(block) if is_whole else faces(block, 2, 0)
+    return (bodies([block], [surface], STIFF) + flies + walls.wall(walls.plane())
             + walls.pair("", f"*FRICTION\n{mu}\n") + f"*BOUNDARY\n{walls.FIXED}" + dynamic(h, until, weight(slope)))
 
 
@@ -471,12 +472,21 @@ def test_loads_of_any_size_take_the_same_iterations(tmp_path: Path, slope: float
     assert max(np.abs(u - moved[1]).max() for u in moved) < 1e-6*size
 
 
-def test_traction_and_slip_of_faces(tmp_path: Path) -> None:
-    """Vectors in space: traction adds up to what acts along the plane, slip is how the nodes went."""
-    text = on_floor(.3, .01, .1, (1., .2, 0), (0, 0, 1.), is_rigid=False)
+@pytest.mark.parametrize("is_whole", [False, True])
+def test_traction_and_slip_of_faces(is_whole: bool, tmp_path: Path) -> None:
+    """Vectors in space: traction adds up to what acts along the plane, slip is how the nodes went. Faces beside the plane
+    bear nothing but what they lean over it."""
+    text = on_floor(.3, .01, .1, (1., .2, 0), (0, 0, 1.), is_rigid=False, is_whole=is_whole)
     run = ran(tmp_path, text.replace("*END STEP", "*CONTACT FILE\nCF, CSHEAR, CSLIP\n*END STEP"))
     fields, faces = run.fields(), FieldsOf(run.file(".surfaces.vtkhdf"))
     is_face = np.isfinite(faces.cell["contact_status"][0]).ravel()
+    node = faces.point["node"][0].astype(int)
+    is_low = np.array([np.ptp(fields.x[node[np.asarray(cell, int)], 2]) == 0.0 and fields.x[node[int(cell[0])], 2] == 0.0
+                       for cell in faces.cells])
+    for name in ("contact_shear", "contact_pressure"):
+        size = np.abs(faces.cell[name][:, is_face]).reshape(len(fields.time), is_face.sum(), -1).max(-1)
+        assert size[:, ~is_low[is_face]].max(initial=0.0) < 1e-2*size.max()
+    is_face &= is_low
     shear, slip = faces.cell["contact_shear"][:, is_face], faces.cell["contact_slip"][:, is_face]
     assert is_face.sum() == 4
     force = fields["contact_force"][:, np.array(slab().on(2, 0)) - 1].sum(1)
@@ -484,7 +494,6 @@ def test_traction_and_slip_of_faces(tmp_path: Path) -> None:
     assert np.abs(.25*shear.sum(1)[1:, :2] - force[1:, :2]).max() < 1e-2*np.abs(force).max()
     assert np.abs(shear[..., 2]).max() < 1e-12*np.abs(shear).max()
     moved = fields["displacement"][-1]
-    node = faces.point["node"][0].astype(int)
     for k, way in zip(np.flatnonzero(is_face), slip[-1], strict=True):
         wanted = moved[node[np.asarray(faces.cells[k], int)], :2].mean(0)
         assert np.abs(way[:2] - wanted).max() < 1e-10
