@@ -1,7 +1,8 @@
 !> The faces of contact surfaces in space, and what contact does to each.
 !>
 !> A force on a node belongs to the faces there, whichever side of a pair it is on: so both sides of
-!> a pair show all of the pressure between them. Friction goes where pressure does. Source: docs/theory.md, section 14.
+!> a pair show all of the pressure between them. Friction goes where pressure does. Source:
+!> docs/theory.md, section 14.
 module emcon_contact_faces
    use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use emcon_facet_values, only : facets_share
@@ -134,7 +135,7 @@ contains
       type(stepper_t), intent(inout) :: stepper
       type(face_values_t), intent(out) :: values
       real(dp), allocatable :: of_all(:, :)
-      real(wp), allocatable :: force(:, :), pressed(:, :), share(:, :), normal(:, :), push(:, :)
+      real(wp), allocatable :: force(:, :), pressed(:, :), share(:, :), push(:, :), normal(:, :)
       integer :: f, n
 
       allocate(of_all, source=contact_field(stepper, "CF"))
