@@ -2,7 +2,7 @@
 !> Which they are in the end: emcon_contact_rounds.
 module emcon_active_set
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_select
-   use emcon_contact, only : gap_ratio, gap_state_t
+   use emcon_contact, only : gap_state_t
    use emcon_contact_support, only : contact_support_complete, contact_support_forget, &
       contact_support_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
@@ -345,8 +345,8 @@ contains
       real(wp), intent(in) :: tolerance          !! largest new stand-off per edge; 0: any
 
       stands_at = .not. tolerance > 0.0_wp
-      if (.not. stands_at) stands_at = gap_ratio(gap, gap%gap0 - max(0.0_wp, gap%closed)) &
-         <= max(tolerance, most_stand_off)
+      if (.not. stands_at) stands_at = gap%gap0 - max(0.0_wp, gap%closed) &
+         <= max(tolerance, most_stand_off)*min(gap%size, gap%other_size)
    end function stands_at
 
    !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
