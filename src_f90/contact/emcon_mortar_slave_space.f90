@@ -10,8 +10,7 @@ module emcon_mortar_slave_space
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: mortar_slave_t, mortar_slave_init, mortar_slave_weight, mortar_slave_direction, &
-      mortar_slave_axis_t, mortar_slave_axis, mortar_slave_corners
+   public :: mortar_slave_t, mortar_slave_init, mortar_slave_weight, mortar_slave_direction
 
    type :: mortar_slave_t
       type(facet_split_t) :: split
@@ -26,12 +25,6 @@ module emcon_mortar_slave_space
       !> (2, n) a direction along the surface at each, in the sides of its first facet at its vertex
       real(wp), allocatable :: along(:, :)
    end type mortar_slave_t
-
-   !> A direction along the slave, which nodes move.
-   type :: mortar_slave_axis_t
-      real(wp) :: along(3) = 0.0_wp                   !! of any length
-      real(wp), allocatable :: weight(:)              !! (n_node) of those of a condition in it
-   end type mortar_slave_axis_t
 
 contains
 
@@ -126,31 +119,20 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: side(3, 2)        !! to the next vertex and to the one before [L]
-      integer :: j, corner(3)
-
-      corner = mortar_slave_corners(self, own, i)
-      do j = 1, 2
-         associate (from => corner(1), to => corner(1 + j))
-            side(:, j) = (x(:, to) - x(:, from)) + (u(:, to) - u(:, from))
-         end associate
-      end do
-   end subroutine find_sides
-
-   !> The nodes that a direction of constraint `i` turns with: of its first facet its vertex, the
-   !> next one and the one before.
-   pure function mortar_slave_corners(self, own, i) result(corner)
-      class(mortar_slave_t), intent(in) :: self
-      integer, intent(in) :: own(:)              !! nodes of the slave
-      integer, intent(in) :: i                   !! 1..n
-      integer :: corner(3)
+      integer :: j, to(2)
 
       associate (f => self%split%facet(self%triangle(self%start(i))), &
             m => self%vertex(self%start(i)))
          associate (n => self%weights%n(f))
-            corner = own(self%weights%node([m, 1 + mod(m, n), 1 + mod(m + n - 2, n)], f))
+            to = own(self%weights%node([1 + mod(m, n), 1 + mod(m + n - 2, n)], f))
+            associate (from => own(self%weights%node(m, f)))
+               do j = 1, 2
+                  side(:, j) = (x(:, to(j)) - x(:, from)) + (u(:, to(j)) - u(:, from))
+               end do
+            end associate
          end associate
       end associate
-   end function mortar_slave_corners
+   end subroutine find_sides
 
    !> The direction along the surface at constraint `i` at x + u, of any length: it turns with that.
    pure function mortar_slave_direction(self, own, i, x, u) result(along)
@@ -164,28 +146,6 @@ contains
       call find_sides(self, own, i, x, u, side)
       along = matmul(side, self%along(:, i))
    end function mortar_slave_direction
-
-   !> The same, with the weights of the nodes of a condition in it if they are asked for.
-   pure function mortar_slave_axis(self, own, i, x, u, node, has_weights) result(axis)
-      class(mortar_slave_t), intent(in) :: self
-      integer, intent(in) :: own(:)              !! nodes of the slave
-      integer, intent(in) :: i                   !! 1..n
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      integer, intent(in) :: node(:)             !! of the condition, with all of its facets
-      logical, intent(in) :: has_weights         !! else none
-      type(mortar_slave_axis_t) :: axis
-      integer :: j, corner(3)
-
-      axis%along = mortar_slave_direction(self, own, i, x, u)
-      if (.not. has_weights) return
-      allocate(axis%weight(size(node)), source=0.0_wp)
-      corner = mortar_slave_corners(self, own, i)
-      do j = 1, size(node)
-         if (node(j) == corner(1)) axis%weight(j) = axis%weight(j) - sum(self%along(:, i))
-         if (node(j) == corner(2)) axis%weight(j) = axis%weight(j) + self%along(1, i)
-         if (node(j) == corner(3)) axis%weight(j) = axis%weight(j) + self%along(2, i)
-      end do
-   end function mortar_slave_axis
 
    !> The multiplier of place `k` of `triangle` at the corners of that: the dual one if theta is 1,
    !> the linear one if it is 0.

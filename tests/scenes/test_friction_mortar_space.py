@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -354,6 +355,26 @@ def test_held_in_statics(slope: float, tmp_path: Path) -> None:
         assert np.abs(np.abs(force) - .5*g*np.array([np.sin(angle), 0.0, np.cos(angle)])).max() < 1e-8*g
     # Places change by some 1e-3 of a face under the load of 1.
     assert np.abs(moved[0] - moved[1]).max() < 1e-2*np.abs(moved[1]).max()
+
+
+@pytest.mark.parametrize("cells", [1, 2])
+@pytest.mark.parametrize("shape", [lambda x: x, ball])
+def test_dragged_along_a_diagonal(shape: Callable[[np.ndarray], np.ndarray], cells: int, tmp_path: Path) -> None:
+    """What is its own mirror image in x = y is pressed on a face and dragged along that, in one increment: so friction is,
+    though the faces of the slave are sheared and turn."""
+    one = Block("C3D8", (cells,)*3, size=(2, 2, 2), place=shape)
+    one.x[:, 2] -= one.x[:, 2].min()
+    two = Block("C3D8", (1, 1, 1), size=(8, 8, 1), place=lambda x: x - np.array([4, 4, 1]))
+    top = "".join(f"*NSET, NSET={name}\n" + "".join(f"{k}\n" for k in on)
+                  for name, on in (("TOP", one.on(2, 1)), ("PLATE", range(len(one.x) + 1, len(one.x) + len(two.x) + 1))))
+    text = (bodies([one, two], [faces(one), faces(two, 2, 1)], "*ELASTIC\n1000., 0.\n") + top + pair(MORTAR, "*FRICTION\n.3\n")
+            + "*BOUNDARY\nPLATE, 1, 3\n*STEP, NLGEOM\n*STATIC\n1., 1.\n*BOUNDARY\nTOP, 1, 2\nTOP, 3, 3, -.05\n*END STEP\n"
+            + "*STEP, NLGEOM\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\nTOP, 1, 2, .2\n*NODE FILE\nRF\n*END STEP\n")
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    force = run.fields()["reaction_force"][-1, np.array(one.on(2, 1)) - 1].sum(0)
+    assert abs(force[0] - force[1]) < 1e-9*abs(force[2])
+    assert np.hypot(*force[:2]) == pytest.approx(.3*abs(force[2]), rel=1e-3)
 
 
 def test_a_ball_slides_and_rolls(tmp_path: Path) -> None:
