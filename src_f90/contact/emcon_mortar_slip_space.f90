@@ -13,7 +13,6 @@ module emcon_mortar_slip_space
    use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_look_space, only : patch_cells
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
-   use emcon_rotation, only : cross_product
    implicit none
    private
    public :: mortar_slip_t, mortar_slip_choose, mortar_slip_shift, mortar_slip_of, &
@@ -27,15 +26,13 @@ module emcon_mortar_slip_space
       integer, allocatable :: point(:, :)        !! (as `vertex`) of the master
       !> (3, 3, n_cell) integrals of products of the weights that are 1 at one corner [L^2]
       real(wp), allocatable :: products(:, :, :)
-      !> (3, 2, n_cell) sides of the master's triangles as the step begins [L]
-      real(wp), allocatable :: side(:, :, :)
    end type mortar_slip_t
 
-   !> The direction that slip is counted along. Where friction acts by the end of the step it is
-   !> carried there by the master, which slip is measured on: the slave may turn on that.
+   !> The direction that slip is counted along, which stays over the step: a slave that turns on the
+   !> master meanwhile does not turn friction against slip.
    type :: slip_axis_t
-      real(wp) :: along(3) = 0.0_wp              !! as the step begins, of any length
-      logical :: is_carried = .false.
+      real(wp) :: along(3) = 0.0_wp              !! of the slave as the step begins, of any length
+      logical :: is_at_end = .false.             !! friction acts by the end of the step alone
    end type slip_axis_t
 
    !> Where the vertices of a triangle's stencil are.
@@ -51,7 +48,6 @@ module emcon_mortar_slip_space
       integer, allocatable :: point(:, :)        !! (3, >= n)
       real(wp), allocatable :: at(:, :, :), way(:, :, :)   !! (3, 4, >= n) as `frame_slip` [L]
       real(wp), allocatable :: weight(:, :, :)   !! (3, n_node, >= n) of nodes in these vectors
-      real(wp), allocatable :: side(:, :, :)     !! (3, 2, >= n) of `mortar_slip_t` [L]
    end type slip_cells_t
 
 contains
@@ -91,7 +87,6 @@ contains
       integer, allocatable :: cell(:)
       integer :: k
 
-      at = 0.0_wp
       products = 0.0_wp
       area = 0.0_wp
       covered = 0.0_wp
@@ -114,21 +109,7 @@ contains
          self%vertex = stencil%patch%triangle(:, cell)
          self%point = reshape(stencil%point([self%vertex]), shape(self%vertex))
       end if
-      if (allocated(self%side)) deallocate(self%side)
-      allocate(self%side(3, 2, size(cell)))
-      do k = 1, size(cell)
-         self%side(:, :, k) = sides_of(at, self%vertex(:, k))
-      end do
    end subroutine choose_triangle
-
-   !> From the first vertex of a triangle of the master to the others.
-   pure function sides_of(at, v) result(side)
-      real(wp), intent(in) :: at(:, :)           !! of `patch_stencil_gather` [L]
-      integer, intent(in) :: v(3)                !! its vertices in the stencil
-      real(wp) :: side(3, 2)
-
-      side = at(:, 3 + v(2:)) - spread(at(:, 3 + v(1)), 2, 2)
-   end function sides_of
 
    !> The integrals of the multiplier of constraint place `k` over the cells of its triangle, with
    !> the weights that are 1 at one corner of that.
@@ -262,9 +243,8 @@ contains
             weight => cells%weight(:, :, m))
          column = [1, 2, 2 + v(1)]
          if (is_new) then
-            at(:, 2:3) = sides_of(sight%at, v)
-            way(:, 2:3) = sides_of(sight%way, v)
-            cells%side(:, :, m) = self%side(:, :, c)
+            at(:, 2:3) = sight%at(:, 3 + v(2:)) - spread(sight%at(:, 3 + v(1)), 2, 2)
+            way(:, 2:3) = sight%way(:, 3 + v(2:)) - spread(sight%way(:, 3 + v(1)), 2, 2)
          end if
          do l = 1, 3
             at(:, 4) = at(:, 4) + part(l)*sight%at(:, 1 + column(l))
@@ -296,7 +276,6 @@ contains
          most = most + size(self(faces%triangle(k))%vertex, 2)
       end do
       allocate(cells%point(3, most), source=0)
-      allocate(cells%side(3, 2, most))
       allocate(cells%at(3, 4, most), cells%way(3, 4, most), cells%weight(3, n_node, most), &
          source=0.0_wp)
    end subroutine begin_cells
@@ -345,7 +324,7 @@ contains
       type(condition_t), intent(inout) :: item
       type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
-      real(wp) :: total, part(2), along(3)
+      real(wp) :: total
       integer :: c, k
 
       total = total_of(self, faces, i)
@@ -357,44 +336,12 @@ contains
                moments_of(self, faces, k)/total, item%node(:item%n_node))
          end associate
       end do
-      along = axis%along
       do c = 1, cells%n
-         if (axis%is_carried) then
-            part = parts_of(cells%side(:, :, c), axis%along)
-            along = matmul(cells%at(:, 2:3, c), part)
-         end if
-         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, item%leaves_second, &
-            axis%is_carried, cell)
-         if (axis%is_carried .and. .not. item%leaves_second) call add_carried(part, cell)
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), axis%along, item%leaves_second, &
+            axis%is_at_end, cell)
          call spread_cell(cell, cells%weight(:, :, c), item)
       end do
    end subroutine mortar_slip_add
-
-   !> What of a direction in the plane of a triangle is along its sides.
-   pure function parts_of(side, along) result(part)
-      real(wp), intent(in) :: side(3, 2)         !! [L]
-      real(wp), intent(in) :: along(3)
-      real(wp) :: part(2), normal(3)
-
-      normal = cross_product(side(:, 1), side(:, 2))
-      part = [dot_product(normal, cross_product(along, side(:, 2))), &
-         dot_product(normal, cross_product(side(:, 1), along))]/dot_product(normal, normal)
-   end function parts_of
-
-   !> The direction goes with the sides.
-   pure subroutine add_carried(part, slip)
-      real(wp), intent(in) :: part(2)            !! of it along each
-      type(frame_slip_t), intent(inout) :: slip
-      integer :: k, s
-
-      do s = 1, size(slip%f)
-         do k = 1, 2
-            associate (own => slip%h(:, 3*k - 2:3*k, s))
-               own = own + part(k)*slip%by_along(:, :, s)
-            end associate
-         end do
-      end do
-   end subroutine add_carried
 
    !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
    !> are 0, so that of the first node says nothing more.

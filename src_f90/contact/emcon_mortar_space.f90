@@ -472,9 +472,9 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
 
-      axis%is_carried = acts_by_end(self%step)
-      if (axis%is_carried) axis%along = self%along(:, i)
-      if (.not. axis%is_carried) axis%along = direction_of(self, i, x, u0)
+      axis%is_at_end = acts_by_end(self%step)
+      if (axis%is_at_end) axis%along = self%along(:, i)
+      if (.not. axis%is_at_end) axis%along = direction_of(self, i, x, u0)
    end function axis_of
 
    pure function direction_of(self, i, x, u) result(along)
