@@ -355,14 +355,27 @@ contains
             - self%sagitta(i)
          if (allocated(self%own_slack)) then
             state%closed = -merge(self%slack, self%own_slack(i), self%step%has_compliance) &
-               *min(state%size, state%other_size)
+               *room_at(self, i)
          else if (self%slack > 0.0_wp) then
-            state%closed = -self%slack*min(state%size, state%other_size)
+            state%closed = -self%slack*room_at(self, i)
          end if
          self%cover(i) = cover(1)
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
       end associate
    end subroutine measure_frame
+
+   !> What a guard's slack at frame `i` is a part of: the smaller of both facets, or twice the
+   !> thinner of both bodies there, so that nothing goes through a thin one [L].
+   pure real(wp) function room_at(self, i) result(room)
+      type(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint, with a triangle in front of it
+
+      associate (sides => self%sides, point => self%sides%frames%point(self%frame(i)), &
+            facet => self%sides%triangles%split%facet(self%stencil(i)%triangle))
+         room = min(self%stencil(i)%size, sides%frames%size(point), &
+            2.0_wp*sides%rule%depth(facet), 2.0_wp*sides%rule%own_depth(point))
+      end associate
+   end function room_at
 
    pure subroutine patch_evaluate(self, wanted, x, u0, du, target, item)
       class(patch_contact_t), intent(inout) :: self

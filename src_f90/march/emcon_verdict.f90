@@ -53,6 +53,9 @@ module emcon_verdict
       "names the two"
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
+   !> More than this of the thickness of the element behind a facet is told: contact may soon push
+   !> what is in it out on the other side.
+   real(wp), parameter :: most_through = 0.2_wp
 
    !> How far bodies were in each other.
    type :: overlap_found_t
@@ -275,6 +278,8 @@ contains
 
       self%overlap%of_facets = max(self%overlap%of_facets, increment%overlap%of_facets)
       associate (overlap => increment%overlap, stray => increment%stray)
+         call follow_thickness(self, scene, march, overlap)
+         call follow_thickness(self, scene, march, stray)
          if (max(overlap%depth, stray%depth) <= self%overlap%deepest) return
          self%overlap%deepest = max(overlap%depth, stray%depth)
          self%overlap%time = march%state%clock%time
@@ -292,6 +297,24 @@ contains
       end associate
       if (self%overlap%deepest > most_overlap(self)) call tell_own(self, scene, march, increment)
    end subroutine follow_overlaps
+
+   !> Facets may be much longer than the body behind them is thick: the first place where one is
+   !> deep in the other by that is told.
+   subroutine follow_thickness(self, scene, march, overlap)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(overlap_t), intent(in) :: overlap
+      character(len=:), allocatable :: place, text
+
+      if (overlap%depth*(overlap%length/overlap%thickness) <= most_through) return
+      text = "a body is in another by more than " // to_text(most_through) // " of the " // &
+         "thickness of the elements there"
+      if (has_warning(self, text)) return
+      call overlap_text(overlap, scene%node%label, march%system%space%body, place)
+      call add_warning(self, text // " at time " // to_text(march%state%clock%time, 9) // ", " // &
+         place // ": smaller faces, or SIDES=BOTH of NODE TO SURFACE, keep it out")
+   end subroutine follow_thickness
 
    !> What has gone through itself may come to others from behind.
    subroutine tell_own(self, scene, march, increment)

@@ -22,6 +22,7 @@ module emcon_overlap_query
    type :: overlap_t
       real(wp) :: depth = 0.0_wp                 !! per length of the facet; 0: none
       real(wp) :: length = 0.0_wp                !! of the facet [L]
+      real(wp) :: thickness = huge(1.0_wp)       !! of the element behind it; huge: of a wall [L]
       integer :: node = 0                        !! that is behind, or the nearest on its facet:
       logical :: is_beside = .false.             !! a point beside it is, of an edge or a face
       integer :: facet(max_face_nodes) = 0       !! nodes of the facet that it is behind; 0: no more

@@ -440,6 +440,7 @@ contains
          overlap%node = edge(merge(1, 2, share < 0.5_wp), e)
          overlap%is_beside = share > 0.0_wp .and. share < 1.0_wp
          overlap%length = length
+         overlap%thickness = thickness
          overlap%facet(:size(edge, 1)) = edge(:, nearest%edge)
       end associate
    end subroutine take_deeper

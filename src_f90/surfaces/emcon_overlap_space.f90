@@ -267,6 +267,7 @@ contains
       associate (f => b%split%facet(place%nearest%triangle))
          overlap%depth = place%ratio
          overlap%length = b%length(f)
+         overlap%thickness = b%thickness(f)
          overlap%node = place%node
          overlap%is_beside = place%is_beside
          overlap%facet = 0

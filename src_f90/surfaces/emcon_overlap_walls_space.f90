@@ -94,6 +94,7 @@ contains
                   if (.not. wall_is_solid(wall) .and. spot%distance < -0.5_wp*wall%extent) cycle
                   overlap%depth = -spot%distance/length
                   overlap%length = length
+                  overlap%thickness = huge(length)
                   overlap%node = node
                   overlap%is_beside = .false.
                   overlap%facet = 0

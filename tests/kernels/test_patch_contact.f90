@@ -6,6 +6,7 @@ module test_patch_contact
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
    use emcon_errors, only : error_t
+   use emcon_guards, only : guard_slack
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
@@ -33,6 +34,7 @@ contains
       tests = [ &
          test_case_t("boxes over each other, whole skins", test_flat), &
          test_case_t("a box that is thin: its other side is not seen", test_thin), &
+         test_case_t("a guard of a thin box lets nothing through", test_thin_guard), &
          test_case_t("identity and momenta", test_identity), &
          test_case_t("derivatives against differences", test_derivatives), &
          test_case_t("a surface fades past its end", test_end), &
@@ -100,6 +102,29 @@ contains
       end do
       call check_true(error, count(contact%state%is_over) >= 9, "nodes are over it")
    end subroutine test_thin
+
+   !> A guard lets nodes in by a part of the facets, or of twice the thickness of a box.
+   subroutine test_thin_guard(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: depth(2) = [0.7_wp, 0.03_wp]
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      integer :: i, k
+
+      do k = 1, size(depth)
+         call make("C3D8", 0.01_wp, [0.1_wp, 0.07_wp], depth(k), scene, contact, error)
+         if (allocated(error)) return
+         contact%slack = guard_slack
+         call look(contact, scene, 0.0_wp*scene%x)
+         call check_true(error, any(contact%state%is_over), "nodes are over it")
+         do i = 1, contact%n_constraint
+            associate (state => contact%state(i))
+               if (state%is_over) call check_near(error, state%closed, -guard_slack &
+                  *min(state%size, state%other_size, 2.0_wp*depth(k)), tol, 1.0_wp, to_text(i))
+            end associate
+         end do
+      end do
+   end subroutine test_thin_guard
 
    !> A bar that leans in the hole of a plate. Along the normal of its right side are the wall of
    !> the hole in front and, far behind, the upper side of the plate, which hangs together with the
