@@ -25,7 +25,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # A run puts its results on the disc before it is called done: tests then wait for the disc longer than they compute.
 MEMORY = pathlib.Path("/dev/shm")
-#: What of it must be free, in bytes: all tests together write less than a quarter.
+#: What of it must be free, in bytes: more than all that tests have at a time.
 ROOM = 4e9
 
 # Whole runs of the ring scene that tests of several files look at, dearest first.
