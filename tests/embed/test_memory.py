@@ -105,6 +105,6 @@ def test_no_memory_is_lost(installed: dict[str, str], tmp_path: Path) -> None:
     command = all_in_one(tmp_path, installed)
     if not SANITIZED:
         need("valgrind")
-        command = ["valgrind", "--vex-iropt-level=1", "--leak-check=full", "--errors-for-leak-kinds=definite",
+        command = ["valgrind", "--leak-check=full", "--errors-for-leak-kinds=definite",
                    "--error-exitcode=9", "--quiet", *command]
     run(*command, env=installed)
