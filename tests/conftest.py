@@ -23,7 +23,7 @@ import scene_tools  # noqa: E402
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# A run puts its results on the disc before it is called done: tests then wait for the disc longer than they compute.
+# A run puts its results on the disc before it ends: small ones would wait for that as long as they compute.
 MEMORY = pathlib.Path("/dev/shm")
 #: What of it must be free, in bytes: more than all that tests have at a time.
 ROOM = 4e9
