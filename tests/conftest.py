@@ -3,6 +3,7 @@
 import collections
 import concurrent.futures
 import functools
+import gc
 import os
 import pathlib
 import random
@@ -64,6 +65,17 @@ def pytest_configure(config):
     named = {"TMPDIR", "TEMP", "TMP", "PYTEST_DEBUG_TEMPROOT"} & set(os.environ)
     if config.option.basetemp is None and not named and holds_programs(MEMORY):
         os.environ["PYTEST_DEBUG_TEMPROOT"] = str(MEMORY)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected stays to the end: no search for garbage looks at it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def mark_what_others_show(items):
