@@ -3,6 +3,7 @@
 import collections
 import concurrent.futures
 import functools
+import gc
 import os
 import pathlib
 import random
@@ -23,6 +24,11 @@ import scene_tools  # noqa: E402
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# A run puts its results on the disc before it ends: small ones would wait for that as long as they compute.
+MEMORY = pathlib.Path("/dev/shm")
+#: What of it must be free, in bytes: more than all that tests have at a time.
+ROOM = 4e9
+
 # Whole runs of the ring scene that tests of several files look at, dearest first.
 RING_RUNS = [
     ("AUTO", 0.01),
@@ -42,6 +48,34 @@ def pytest_addoption(parser):
     parser.addoption("--order", metavar="SEED", help="run the tests in an order drawn by chance: "
                      "files, and the tests of a file")
     parser.addoption("--long", action="store_true", help="tests marked as long as well")
+
+
+def holds_programs(folder):
+    """May programs be run from `folder`, and is there room for all that tests write?"""
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return False
+    system = os.statvfs(folder)
+    free = re.search(r"^MemAvailable: *(\d+) kB", pathlib.Path("/proc/meminfo").read_text(), re.M)
+    return (not system.f_flag & os.ST_NOEXEC and free is not None
+            and min(system.f_bavail*system.f_frsize, int(free[1])*1024) > ROOM)
+
+
+def pytest_configure(config):
+    """Folders of tests in memory, unless the caller has named a place."""
+    named = {"TMPDIR", "TEMP", "TMP", "PYTEST_DEBUG_TEMPROOT"} & set(os.environ)
+    if config.option.basetemp is None and not named and holds_programs(MEMORY):
+        os.environ["PYTEST_DEBUG_TEMPROOT"] = str(MEMORY)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected stays to the end: no search for garbage looks at it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def mark_what_others_show(items):

@@ -248,8 +248,8 @@ def deepest(p, edge, away, bodies):
 
 # ---- three dimensions ---------------------------------------------------------------------------
 
-#: Pairs of a point and a triangle that are looked at in one go.
-AT_ONCE = 400_000
+#: Pairs of a point and a triangle that are looked at in one go: as many as stay in a cache.
+AT_ONCE = 20_000
 TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 BETWEEN = {10: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
@@ -277,34 +277,53 @@ def in_parts(n_point, n_triangle):
     return [slice(k, k + size) for k in range(0, n_point, size)]
 
 
+def dot(a, b):
+    """Of vectors by their components, (3, ...): no sums over short axes, which take longer than all else."""
+    return a[0]*b[0] + a[1]*b[1] + a[2]*b[2]
+
+
+def normal_to(a, b):
+    return a[1]*b[2] - a[2]*b[1], a[2]*b[0] - a[0]*b[2], a[0]*b[1] - a[1]*b[0]
+
+
+def between(start, end):
+    return [e - s for s, e in zip(start, end, strict=True)]
+
+
+def by_component(points):
+    """Components of points (n, 3) as (3, n); of corners (n, 3, 3) as (3, 3, n), the first index which corner."""
+    return np.ascontiguousarray(np.moveaxis(points, 0, -1))
+
+
 def turns(p, corner):
     """How many times closed triangles (n, 3, 3), seen from outside counter-clockwise, go around each point."""
     found = np.zeros(len(p))
+    corners, points = by_component(corner), by_component(p)[..., None]
     for part in in_parts(len(p), len(corner)):
-        a, b, c = (corner[:, k] - p[part, None] for k in range(3))
-        la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
-        volume = (a*np.cross(b, c)).sum(-1)
-        rest = la*lb*lc + (a*b).sum(-1)*lc + (b*c).sum(-1)*la + (c*a).sum(-1)*lb
-        found[part] = np.arctan2(volume, rest).sum(-1)/(2*np.pi)
+        a, b, c = (between(points[:, part], own) for own in corners)
+        la, lb, lc = (np.sqrt(dot(v, v)) for v in (a, b, c))
+        rest = la*lb*lc + dot(a, b)*lc + dot(b, c)*la + dot(c, a)*lb
+        found[part] = np.arctan2(dot(a, normal_to(b, c)), rest).sum(-1)/(2*np.pi)
     return found
 
 
 def to_triangles(p, corner):
     """Distance of each point from the triangles, and the index of the nearest."""
     far, which = np.zeros(len(p)), np.zeros(len(p), int)
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    corners, points = by_component(corner), by_component(p)[..., None]
+    side = [between(corners[k], corners[(k + 1) % 3]) for k in range(3)]
+    normal = normal_to(side[0], between(corners[0], corners[2]))
+    tiny = np.finfo(float).tiny
     for part in in_parts(len(p), len(corner)):
-        q = p[part, None]
-        away = np.full((q.shape[0], len(corner)), np.inf)
-        over = np.ones_like(away, dtype=bool)
-        for k in range(3):
-            a, d = corner[:, k], corner[:, (k + 1) % 3] - corner[:, k]
-            share = np.clip(((q - a)*d).sum(-1)/np.maximum((d*d).sum(-1), np.finfo(float).tiny), 0, 1)
-            away = np.minimum(away, np.linalg.norm(q - a - share[..., None]*d, axis=-1))
-            over &= (np.cross(d, q - a)*normal).sum(-1) > 0
-        height = np.abs(((q - corner[:, 0])*normal).sum(-1))/np.maximum(np.linalg.norm(normal, axis=-1),
-                                                                       np.finfo(float).tiny)
-        away = np.where(over, height, away)
+        square, over = np.inf, True
+        for start, d in zip(corners, side, strict=True):
+            to_q = between(start, points[:, part])
+            share = np.clip(dot(to_q, d)/np.maximum(dot(d, d), tiny), 0, 1)
+            left = [q - share*along for q, along in zip(to_q, d, strict=True)]
+            square = np.minimum(square, dot(left, left))
+            over = over & (dot(normal_to(d, to_q), normal) > 0)
+        height = np.abs(dot(between(corners[0], points[:, part]), normal))/np.maximum(np.sqrt(dot(normal, normal)), tiny)
+        away = np.where(over, height, np.sqrt(square))
         which[part] = away.argmin(1)
         far[part] = away.min(1)
     return far, which
@@ -313,22 +332,26 @@ def to_triangles(p, corner):
 def cut(a, b, corner):
     """Middles of the parts in which edges a-b are cut by triangles."""
     middles = []
-    one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    corners = by_component(corner)
+    one, other = between(corners[0], corners[1]), between(corners[0], corners[2])
+    start_of, along_of = by_component(a)[..., None], by_component(b - a)[..., None]
     for part in in_parts(len(a), len(corner)):
-        along = (b - a)[part, None]
+        along = along_of[:, part]
         with np.errstate(divide="ignore", invalid="ignore"):
-            sideways = np.cross(along, other)
-            turn = (one*sideways).sum(-1)
-            start = a[part, None] - corner[:, 0]
-            u = (start*sideways).sum(-1)/turn
-            up = np.cross(start, one)
-            v = (along*up).sum(-1)/turn
-            t = (other*up).sum(-1)/turn
+            sideways = normal_to(along, other)
+            turn = dot(one, sideways)
+            start = between(corners[0], start_of[:, part])
+            u = dot(start, sideways)/turn
+            up = normal_to(start, one)
+            v = dot(along, up)/turn
+            t = dot(other, up)/turn
             hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)
-        for k in range(len(along)):
+        is_cut = hit.any(1)
+        middles.append((a[part] + 0.5*(b - a)[part])[~is_cut])
+        for k in np.flatnonzero(is_cut):
             cuts = np.unique([0., *t[k, hit[k]], 1.])
-            middles += [a[part][k] + s*along[k, 0] for s in 0.5*(cuts[1:] + cuts[:-1])]
-    return np.reshape(middles, (-1, 3))
+            middles.append(a[part][k] + 0.5*(cuts[1:] + cuts[:-1])[:, None]*(b - a)[part][k])
+    return np.vstack([np.empty((0, 3)), *middles])
 
 
 def deepest_inside(x, triangle, other, other_triangle, more=()):

@@ -50,8 +50,8 @@ FOUND = list(commands())
 HELPS = """
 import os, runpy, sys
 import h5py, matplotlib.pyplot, numpy, scipy.sparse.linalg, scipy.special
-sys.path.insert(0, "pywrap")
-import emcon, emcon.plotting, emcon.study
+sys.path[:0] = ["pywrap", "tests/bench"]
+import emcon, emcon.plotting, emcon.study, verification
 for script in sys.argv[1:]:
     if (child := os.fork()) == 0:
         sys.argv, sys.path[:1] = [script, "--help"], [os.path.dirname(script)]

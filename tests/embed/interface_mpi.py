@@ -5,7 +5,7 @@ sets and their multipliers are the same everywhere. It computes the cells that i
 of its own unknowns to the solver. What is exchanged is put together in the order of cells and unknowns: the bits
 do not depend on how many processes there are. Lines that MPI adds are marked by `mpi`.
 
-    mpirun -n 3 python interface_mpi.py KIND FRICTION N_STEP
+    mpirun -n 3 python interface_mpi.py FRICTION N_STEP KIND ...
 """
 
 from __future__ import annotations
@@ -53,13 +53,14 @@ class SpreadHost(Host):
 
 
 if __name__ == "__main__":
-    kind, friction, n_step = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
-    bodies = SpreadHost(collision(kind, friction))
-    start = bodies.energy()
-    for _ in range(n_step):
-        bodies.step(0.01)
-    state = np.concatenate([bodies.u.ravel(), bodies.v.ravel(), [bodies.lost, bodies.energy()/start - 1]])
-    if len(set(WORLD.allgather(state.tobytes()))) > 1:
-        raise ArithmeticError("processes differ")
-    if WORLD.rank == 0:
-        print(*map(float.hex, state.tolist()), sep="\n")
+    friction, n_step, *kinds = float(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:]
+    for kind in kinds:
+        bodies = SpreadHost(collision(kind, friction))
+        start = bodies.energy()
+        for _ in range(n_step):
+            bodies.step(0.01)
+        state = np.concatenate([bodies.u.ravel(), bodies.v.ravel(), [bodies.lost, bodies.energy()/start - 1]])
+        if len(set(WORLD.allgather(state.tobytes()))) > 1:
+            raise ArithmeticError("processes differ")
+        if WORLD.rank == 0:
+            print(*map(float.hex, state.tolist()))

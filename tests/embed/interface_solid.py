@@ -63,14 +63,14 @@ class Solid:
         """Forces of each cell over the step, and their derivative by du."""
         d0, d1 = self.gradient(u0), self.gradient(u0 + du)
         s = self.stress(0.5*(strain(d0) + strain(d1)))
-        g, w, one, (lam, mu) = self.slope, self.volume, np.eye(3), self.lame
+        g, w, one, (lam, mu) = self.slope, self.volume[:, :, None, None], np.eye(3), self.lame
         middle, end = one + 0.5*(d0 + d1), one + d1
-        force = np.einsum("epab,epbc,epic,ep->eia", middle, s, g, w, optimize=True).reshape(self.dof.shape)
-        by_middle, by_end = (np.einsum("epab,epib->epia", f, g) for f in (middle, end))
-        k = 0.5*lam*np.einsum("epia,epjb,ep->eiajb", by_middle, by_end, w, optimize=True)
-        k += 0.5*mu*np.einsum("epac,epbc,epid,epjd,ep->eiajb", middle, end, g, g, w, optimize=True)
-        k += 0.5*mu*np.einsum("epja,epib,ep->eiajb", by_middle, by_end, w, optimize=True)
-        k += 0.5*np.einsum("epic,epcd,epjd,ab,ep->eiajb", g, s, g, one, w, optimize=True)
+        force = (w*g @ (middle @ s).swapaxes(-1, -2)).sum(1).reshape(self.dof.shape)
+        by_middle, by_end = (g @ f.swapaxes(-1, -2) for f in (middle, end))
+        both = np.einsum("epia,epjb->eiajb", w*by_middle, by_end)
+        k = 0.5*lam*both + 0.5*mu*both.transpose(0, 3, 2, 1, 4)
+        k += 0.5*mu*np.einsum("epab,epij->eiajb", w*(middle @ end.swapaxes(-1, -2)), g @ g.swapaxes(-1, -2))
+        k += 0.5*np.einsum("epij,ab->eiajb", w*(g @ s @ g.swapaxes(-1, -2)), one)
         return force, k.reshape(len(k), 24, 24)
 
     def respond(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:

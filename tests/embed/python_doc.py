@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import io
 import itertools
 import json
 import linecache
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -36,6 +38,8 @@ RUNS = {"python", "sh run", "text deck"}
 OUTPUTS = ("text", "text rounded", "text varies")
 #: Of one chapter [s].
 LONGEST = 300
+#: Files in the folder of a chapter: what its examples print, and what went past that.
+ANSWER, ERRORS = ".answer", ".errors"
 #: Numbers of `text rounded`: processors round differently, so that counts of iterations and last
 #: digits differ by some percent; what is below the other bound is round-off as a whole.
 NEARLY, ROUND_OFF = 0.1, 1e-10
@@ -126,14 +130,8 @@ def run_chapter(page: str, title: str, folder: Path) -> list[str]:
         if example.file:
             (folder/example.file).write_text(example.code.text, encoding="utf-8")
     (folder/"input_decks").symlink_to(ROOT/"input_decks")
-    path = os.pathsep.join([str(ROOT/"build"/"release"), os.environ.get("PATH", "")])
-    env = os.environ | {"PYTHONPATH": str(ROOT/"pywrap"), "PATH": path, "MPLBACKEND": "agg"}
-    work = json.dumps([(example.code.text, example.file, example.code.language)
-                       for example in chapter])
-    done = subprocess.run([sys.executable, str(Path(__file__).resolve()), "--run"], cwd=folder,
-                          env=env, input=work, capture_output=True, text=True, timeout=LONGEST)
-    assert done.returncode == 0, done.stderr
-    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    work = [(example.code.text, example.file, example.code.language) for example in chapter]
+    answer = server().answer(folder, work)
     printed: list[str] = answer["printed"]
     if answer["failed"]:
         block = chapter[len(printed)].code
@@ -141,13 +139,56 @@ def run_chapter(page: str, title: str, folder: Path) -> list[str]:
     return printed
 
 
-def run_blocks() -> None:
-    """In a process of its own: run the code that standard input holds, answer on the output."""
+class Server:
+    """A process that has loaded what examples import, and runs each chapter in a copy of itself."""
+
+    def __init__(self) -> None:
+        path = os.pathsep.join([str(ROOT/"build"/"release"), os.environ.get("PATH", "")])
+        env = os.environ | {"PYTHONPATH": str(ROOT/"pywrap"), "PATH": path, "MPLBACKEND": "agg"}
+        self.process = subprocess.Popen([sys.executable, str(Path(__file__).resolve()), "--run"], env=env, text=True,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def answer(self, folder: Path, work: list[tuple[str, str | None, str]]) -> dict[str, Any]:
+        assert self.process.stdin and self.process.stdout
+        print(json.dumps([str(folder), work]), file=self.process.stdin, flush=True)
+        status = int(self.process.stdout.readline())
+        assert status == 0, f"a chapter ends with {status}\n{(folder/ERRORS).read_text()}"
+        return dict(json.loads((folder/ANSWER).read_text()))
+
+
+@functools.cache
+def server() -> Server:
+    return Server()
+
+
+def serve() -> None:
+    """For each line of standard input: run the chapter in its folder, tell how that has ended."""
+    import h5py  # noqa: F401
+    import matplotlib.pyplot  # noqa: F401
+    import numpy  # noqa: F401
+
+    for line in sys.stdin:
+        folder, work = json.loads(line)
+        child = os.fork()
+        if child == 0:
+            signal.alarm(LONGEST)
+            os.chdir(folder)
+            os.dup2(os.open(os.devnull, os.O_RDWR), 0)
+            os.dup2(os.open(ERRORS, os.O_WRONLY | os.O_CREAT), 2)
+            os.dup2(2, 1)
+            Path(ANSWER).write_text(json.dumps(run_blocks(work)))
+            sys.stdout.flush()
+            os._exit(0)
+        print(os.waitpid(child, 0)[1], flush=True)
+
+
+def run_blocks(work: list[tuple[str, str | None, str]]) -> dict[str, Any]:
+    """In a process of its own: what each example prints, and what was wrong with the last."""
     printed: list[str] = []
     failed = ""
     namespace: dict[str, Any] = {"__name__": "__doc_example__"}
     sys.path[0] = os.getcwd()
-    for k, (text, file, language) in enumerate(json.load(sys.stdin)):
+    for k, (text, file, language) in enumerate(work):
         out = io.StringIO()
         try:
             with contextlib.redirect_stdout(out):
@@ -165,7 +206,7 @@ def run_blocks() -> None:
             failed = f"block {k + 1} of the chapter\n{out.getvalue()}{traceback.format_exc()}"
             break
         printed.append(out.getvalue())
-    print("\n" + json.dumps({"printed": printed, "failed": failed}))
+    return {"printed": printed, "failed": failed}
 
 
 def run_shell(text: str) -> str:
@@ -212,7 +253,7 @@ def main() -> None:
     parser.add_argument("--run", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.run:
-        run_blocks()
+        serve()
         return
     path = ROOT/"docs"/f"{options.page}.md"
     page = path.read_text(encoding="utf-8")

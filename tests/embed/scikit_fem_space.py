@@ -77,11 +77,14 @@ class Host:
         start = end if self.is_static else self.deformation(self.u)
         middle, share = 0.5*(start + end), 1.0 if self.is_static else 0.5
         stress = self.stress(0.5*(green_strain(start) + green_strain(end)))
+        latest: list[Any] = [None, None]
 
         def change(u: Any, v: Any, w: Any) -> Floats:
-            d = share*grad(u)
-            strain = 0.5*(mul(transpose(d), end) + mul(transpose(end), d))
-            return ddot(mul(d, stress) + mul(middle, self.stress(strain)), grad(v))
+            if u is not latest[0]:                       # all v are asked for one u in turn
+                d = share*grad(u)
+                strain = 0.5*(mul(transpose(d), end) + mul(transpose(end), d))
+                latest[:] = u, mul(d, stress) + mul(middle, self.stress(strain))
+            return ddot(latest[1], grad(v))
 
         force = skfem.LinearForm(lambda v, w: ddot(mul(middle, stress), grad(v))).assemble(self.basis)
         return force, skfem.BilinearForm(change).assemble(self.basis)

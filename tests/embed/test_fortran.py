@@ -130,12 +130,18 @@ def test_a_host_in_fortran_keeps_energy_and_momentum(bars: Path, formulation: in
     assert momentum == pytest.approx([1.5, -6.0], abs=6*400*EPS)
 
 
-@pytest.mark.parametrize(("friction", "velocity"), [(0.0, 1.0), (0.3, 0.4), (0.8, 0.0)])
-def test_friction_by_sets_and_with_all_candidates(friction: float, velocity: float, installed: dict[str, str], tmp_path: Path) -> None:
-    """Of the velocity along the floor friction takes twice its coefficient, or all; the energy is in what is left and lost."""
-    program = tmp_path/"friction_loop"
+@pytest.fixture(scope="module")
+def friction_loop(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("loop")/"friction_loop"
     build("gfortran", HERE/"friction_loop.f90", program, installed, "-std=f2008")
-    lines = run(program, friction, env=installed).splitlines()
+    return program
+
+
+@pytest.mark.parametrize(("friction", "velocity"), [(0.0, 1.0), (0.3, 0.4), (0.8, 0.0)])
+def test_friction_by_sets_and_with_all_candidates(friction: float, velocity: float, installed: dict[str, str],
+                                                  friction_loop: Path) -> None:
+    """Of the velocity along the floor friction takes twice its coefficient, or all; the energy is in what is left and lost."""
+    lines = run(friction_loop, friction, env=installed).splitlines()
     assert len(lines) == 2
     for line in lines:
         *v, left, lost = map(float, line.split())

@@ -12,7 +12,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent/"embed"))
 
-from embed_tools import WARNINGS, install, need, run  # noqa: E402
+from embed_tools import WARNINGS, need, run  # noqa: E402
 
 SOURCES = ["cubic_contact.f90", "cushion.f90"]
 EPS = np.finfo(float).eps
@@ -77,10 +77,10 @@ HEAD, 2, 2, -0.02
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+def program(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     need("gfortran")
     folder = tmp_path_factory.mktemp("cubic")
-    env = install(folder/"installed")
+    env = installed
     flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
     run("gfortran", *WARNINGS, "-std=f2008", *(HERE/name for name in SOURCES), "-o",
         folder/"cushion", *flags, env=env, cwd=folder)

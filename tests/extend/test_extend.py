@@ -12,7 +12,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent/"embed"))
 
-from embed_tools import ROOT, WARNINGS, install, need, run  # noqa: E402
+from embed_tools import ROOT, WARNINGS, need, run  # noqa: E402
 
 SOURCES = ["gent_law.f90", "fading_well.f90", "dense_solver.f90", "extended.f90"]
 # A square of two by two elements that spins and is stretched.
@@ -92,10 +92,10 @@ BOTTOM, TOP
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+def program(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     need("gfortran")
     folder = tmp_path_factory.mktemp("extend")
-    env = install(folder/"installed")
+    env = installed
     flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
     run("gfortran", *WARNINGS, "-std=f2008", *(HERE/name for name in SOURCES), "-o",
         folder/"extended", *flags, "-llapack", env=env, cwd=folder)

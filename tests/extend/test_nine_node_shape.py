@@ -13,7 +13,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent/"embed"))
 
-from embed_tools import WARNINGS, install, need, run  # noqa: E402
+from embed_tools import WARNINGS, need, run  # noqa: E402
 
 SOURCES = ["nine_node_shape.f90", "shaped.f90"]
 #: Columns and rows of a cell's nodes: around the outline, then the middle.
@@ -54,10 +54,10 @@ def mesh(nodes: list[str], elements: list[str], card: str = CARD) -> str:
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+def program(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     need("gfortran")
     folder = tmp_path_factory.mktemp("shape")
-    env = install(folder/"installed")
+    env = installed
     flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
     run("gfortran", *WARNINGS, "-Wno-unused-dummy-argument", "-std=f2008",
         *(HERE/name for name in SOURCES), "-o", folder/"shaped", *flags, env=env, cwd=folder)

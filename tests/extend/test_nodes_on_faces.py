@@ -14,7 +14,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent/"embed"))
 
-from embed_tools import WARNINGS, install, need, run  # noqa: E402
+from embed_tools import WARNINGS, need, run  # noqa: E402
 
 SOURCES = ["nodes_on_faces.f90", "met.f90"]
 # A brick over a larger one.
@@ -101,10 +101,10 @@ TOP, 3, -0.1
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+def program(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     need("gfortran")
     folder = tmp_path_factory.mktemp("extend")
-    env = install(folder/"installed")
+    env = installed
     flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
     run("gfortran", *WARNINGS, "-std=f2008", "-fcheck=bounds", *(HERE/name for name in SOURCES),
         "-o", folder/"met", *flags, env=env, cwd=folder)
