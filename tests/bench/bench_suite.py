@@ -254,9 +254,9 @@ def refusal_lines(told):
     rows = sorted(has, key=lambda each: (-len(alone.get(each, [])), -len(has[each]), each))
     shown = [each for each in rows if each in alone or len(first.get(each, [])) > 3]
     accepted = sum(not words for words in told.values())
-    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. The table has the words "
-            "for which others are refused. A word counts if it is the only one in some deck, or the first one "
-            "in more than three:", "",
+    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. The table lists the "
+            "words (keywords, parameters, element types) for which the others are refused. A word is listed "
+            "if it is the only cause for some deck, or the first cause for more than three:", "",
             *table(["word", "decks that have it", "refused by it first", "refused by it alone"],
                    [(f"`{each}`" if each.startswith(("*", "TYPE")) else each, len(has[each]),
                      len(first.get(each, [])),
