@@ -392,7 +392,7 @@ def test_tables_of_develop_name_what_there_is():
     glossary = text.split("\n## Glossary\n")[1].split("\n## ")[0]
     told = set(re.findall(r"`(emcon_\w+)`", glossary))
     assert told and told <= set(modules(ROOT))
-    table = text.split("\n## Which tests for which room\n")[1].split("\n## ")[0]
+    table = text.split("\n## Which tests for which folder\n")[1].split("\n## ")[0]
     rows = re.findall(r"^\| `(\w+)` \|(.*)\|(.*)\|$", table, re.M)
     assert {row[0] for row in rows} == set(ROOMS)
     assert all((ROOT / f"tests/kernels/test_{name}.f90").is_file()

@@ -94,7 +94,7 @@ def page() -> str:
 def modules_page() -> str:
     """All modules with the first sentence of each."""
     made = ["# All modules", "What stands where in `src_f90/`: a module uses those of its own "
-            "folder and of the folders before it ([the house](develop.md#the-house))."]
+            "folder and of the folders before it ([layout of the sources](develop.md#layout-of-the-sources))."]
     folder = ""
     for name, path in files().items():
         if path.parent.name != folder:

@@ -85,7 +85,7 @@ def main() -> None:
                              f"{1000*seconds/INCREMENTS:.1f}", f"{ratio:.2f}",
                              f"{counts['factorisations']/INCREMENTS:.2f}", f"{counts['residuals']/INCREMENTS:.1f}"))
     rows.append(("median with friction", "", "", "", f"{statistics.median(ratios):.2f}", "", ""))
-    lines = table(["on a", "cells", "mu", "ms an increment", "by that without", "factorisations an increment",
+    lines = table(["surface", "cells", "mu", "ms an increment", "time / without friction", "factorisations an increment",
                    "residuals an increment"], rows)
     print("\nBlocks that slide in space, on one thread", *lines, sep="\n")
     if options.update:

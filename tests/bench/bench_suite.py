@@ -60,9 +60,9 @@ def fully(edit=lambda text: text):
 
 
 NEWTON = "CalculiX ends Newton's method at 0.5 % of the forces; to round-off"
-DAMPED = ("numerical damping of CalculiX, ALPHA=-0.05, none here; without it, to round-off, and with "
-          "short increments")
-POINTS = "CalculiX takes the forces of turning by the 2 x 2 x 2 points of C3D20R; with C3D20"
+DAMPED = ("CalculiX damps numerically, ALPHA=-0.05, EMCON does not; both without damping, iterated"
+          " to round-off, with short increments")
+POINTS = "CalculiX integrates centrifugal forces with the 2 x 2 x 2 points of C3D20R; with C3D20"
 #: Why a deck differs by more than CalculiX prints, and by what change of the deck for CalculiX and
 #: for EMCON one sees it; the difference is then told, too.
 WHY = {
@@ -76,27 +76,27 @@ WHY = {
     "beamnldy": (DAMPED, undamped("1e-7", "5e-6"), by_increments("1e-7", "5e-6")),
     "beamnldynodirect": (DAMPED, undamped("1e-7", "5e-6"), by_increments("1e-7", "5e-6")),
     **dict.fromkeys(("beamdynamic", "beamimpdy1", "beamimpdy1nodirect"), (
-        DAMPED + "; and CalculiX takes the mass, too, by the 2 x 2 x 2 points of C3D20R; all three "
-        "mended, with C3D20", *(fully(edit("1e-7", "1e-5")) for edit in (undamped, by_increments)))),
+        DAMPED + "; CalculiX also integrates the mass with the 2 x 2 x 2 points of C3D20R; in "
+                 "addition with C3D20", *(fully(edit("1e-7", "1e-5")) for edit in (undamped, by_increments)))),
     "beamimpdy2": (DAMPED, undamped("1e-6", "1e-4"), by_increments("1e-6", "1e-4")),
     "equrem1": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
     "equrem2": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
     "equrem3": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
     "segment1": (POINTS, *2*(fully(),)),
     "segment2": (POINTS, *2*(fully(),)),
-    "beamnldye": ("explicit, five increments from rest: what stands at a node as mass decides; "
-                  "to twenty times that end", by_increments("1e-8", "1e-6"),
+    "beamnldye": ("explicit, five increments from rest: the lumped masses of the nodes decide, and"
+                  " the codes lump differently; run for twenty times as long", by_increments("1e-8", "1e-6"),
                   by_increments("1e-8", "1e-6")),
-    "ax6": ("CalculiX takes a wedge of two degrees with straight edges; EMCON meets the closed forms "
-            "of tests/scenes/test_axial.py", None, None),
-    "axial": ("CalculiX takes the mass, too, by the 2 x 2 points of CAX8R; with CAX8 the wedge of "
-              "two degrees is left", *2*(lambda text: text.replace("CAX8R", "CAX8"),)),
-    "plate": ("contact of two sides of three nodes, which EMCON takes as two straight edges each; and "
-              "CalculiX takes a brick, as in planestress3; with CPE8R",
+    "ax6": ("CalculiX uses a wedge of two degrees with straight edges; EMCON gives the closed "
+            "forms, tests/scenes/test_axial.py", None, None),
+    "axial": ("CalculiX also integrates the mass with the 2 x 2 points of CAX8R; with CAX8 (the "
+              "wedge of two degrees remains)", *2*(lambda text: text.replace("CAX8R", "CAX8"),)),
+    "plate": ("contact between sides of three nodes, each of which EMCON treats as two straight "
+              "edges; CalculiX uses a brick, as in planestress3; with CPE8R",
               *2*(lambda text: text.replace("CPS8R", "CPE8R"),)),
-    "planestress3": ("CalculiX takes a brick whose thickness its nodes interpolate, EMCON a sheet "
-                     "as thick as each point likes: tests/scenes/test_suite.py has the brick's "
-                     "digits", None, None),
+    "planestress3": ("CalculiX uses a brick whose thickness its nodes interpolate, EMCON has zero "
+                     "stress across the plane at each point: tests/scenes/test_suite.py reproduces"
+                     " the brick's digits", None, None),
 }
 #: Of contact and ties, where bench_contact_decks.py has the causes.
 ELSEWHERE = "see [the next section](#decks-of-contact-and-ties)"
@@ -254,10 +254,10 @@ def refusal_lines(told):
     rows = sorted(has, key=lambda each: (-len(alone.get(each, [])), -len(has[each]), each))
     shown = [each for each in rows if each in alone or len(first.get(each, [])) > 3]
     accepted = sum(not words for words in told.values())
-    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. The table has the words "
-            "for which others are refused. A word counts if it is the only one in some deck, or the first one "
-            "in more than three:", "",
-            *table(["word", "decks that have it", "refused by it first", "opened by it alone"],
+    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. The table lists the "
+            "words (keywords, parameters, element types) for which the others are refused. A word is listed "
+            "if it is the only cause for some deck, or the first cause for more than three:", "",
+            *table(["word", "decks that have it", "refused by it first", "refused by it alone"],
                    [(f"`{each}`" if each.startswith(("*", "TYPE")) else each, len(has[each]),
                      len(first.get(each, [])),
                      ", ".join(f"`{deck}`" for deck in alone.get(each, []))) for each in shown])]

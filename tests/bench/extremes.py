@@ -53,7 +53,7 @@ def line_of(row, outcomes):
                                               if outcome.kind == SILENT else outcome.text)
                      for value, outcome in others)
     return (row.what, ", ".join(map(text_of, row.values)), "all" if not others else ", ".join(map(text_of, held)),
-            f"{row.figure}: {worst:.1e} (bar {row.bar:g})",
+            f"{row.figure}: {worst:.1e} (bound {row.bar:g})",
             said.replace("|", "\\|") or "", row.why)
 
 

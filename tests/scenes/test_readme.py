@@ -244,7 +244,7 @@ def test_modules():
     functions = set(re.findall(r"\b(emcon_\w+)\(", (ROOT / "src_f90/border/emcon.h").read_text()))
     named = {span for span in code_spans(text) if re.fullmatch(r"emcon_\w+", span)}
     assert named & modules and named <= modules | functions
-    table = text.split("## The house")[1].split("Beside it")[0]
+    table = text.split("## Layout of the sources")[1].split("Beside it")[0]
     rooms = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
     assert rooms == next(s.split() for s in code_spans(README.read_text()) if s.endswith(" app"))
 

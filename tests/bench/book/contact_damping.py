@@ -36,7 +36,7 @@ def report_known(started, _):
         rows.append((f"`{kind}`", f"{h:g}", size(np.ptp(kept)), size(np.abs(gap - exact).max()),
                      size(np.abs(velocity - np.exp(-0.75*slide.history["time"])).max()),
                      size(max(balance(run.history) for run in (fall, slide)))))
-    return table(["type", "h", "impulse by the way", "gap", "velocity along the floor", "balance"],
+    return table(["type", "h", "change of v + 3 g", "gap", "velocity along the floor", "balance"],
                  rows)
 
 
@@ -55,7 +55,7 @@ def report_ring(started, _):
                      size(max(0.0, -least)), size(balance(history)),
                      *(size(drift(history[name])) for name in ("px", "py", "lz")),
                      f"{history['newton'][1:].mean():.1f}", int(history["cuts"].sum())))
-    return table(["type", "method", "sides", "dissipated, over the energy", "gained from it", "balance", "px",
+    return table(["type", "method", "sides", "dissipated / energy", "gained from it", "balance", "px",
                   "py", "lz", "Newton", "cuts"], rows)
 
 

@@ -153,23 +153,23 @@ def report_known(started, _):
     for h in (0.02, 0.01, 0.005):
         time, x, _ = done["belt", h]
         error.append(np.abs(x - belt_way(time, 0.3, 25.0, 0.3)).max()/0.12)
-    rows.append(("stick-slip on a belt, h = 0.02, 0.01, 0.005: largest error by the way that the "
-                 "spring gives at the limit", "order 2", ", ".join(f"{e:.1e}" for e in error)))
+    rows.append(("stick-slip on a belt, h = 0.02, 0.01, 0.005: largest error over the stretch of the spring at the "
+                 "limit of friction", "order 2", ", ".join(f"{e:.1e}" for e in error)))
     time, x, _ = done["pulled"]
-    rows.append(("SDNV104, block pulled against a spring: places at t = 1.7 and 3.4", "14.917, 3.5",
+    rows.append(("SDNV104, block pulled against a spring: positions at t = 1.7 and 3.4", "14.917, 3.5",
                  f"{np.interp(1.7, time, x):.3f}, {np.interp(3.4, time, x):.3f}"))
     rows += [(f"SSNV128, plate pressed sideways, {n} x {n}: displacements at the floor, 1e-6",
               "28.6, 27.2, 22.8, 19.8, 15.0",
               ", ".join(f"{u:.2f}" for u in plate(done["plate", n], n))) for n in PLATES]
-    rows.append(("the same outside the program, linear, elements of eight nodes, 32 x 32",
+    rows.append(("the same by the independent numpy program, linear, elements of eight nodes, 32 x 32",
                  "28.6, 27.2, 22.8, 19.8, 15.0", ", ".join(f"{u:.2f}" for u in done["plate alone"])))
     force, width, strip = partial_slip(done["to and fro"], pressed_round(96, back=BACK)[1]).T
     turn = np.argmax(force)
     for k in (*range(3, turn, 4), turn, *range(turn + 2, len(force), 3)):
         goes_back = k > turn
         share = (force[turn] - force[k])/2 if goes_back else force[k]
-        rows.append((f"two like bodies, one round, Q = {force[k]:.3f} mu P{', back' if goes_back else ''}: "
-                     f"strip that sticks by that in contact, nodes {strip[k]:.2f} apart",
+        rows.append((f"two equal bodies, one round, Q = {force[k]:.3f} mu P{', back' if goes_back else ''}: "
+                     f"width that sticks over width in contact, nodes {strip[k]:.2f} apart",
                      f"{math.sqrt(1 - share):.3f}", f"{width[k]:.3f}"))
     return table(["scene", "known", "here"], rows)
 
@@ -369,7 +369,7 @@ def report_space(started, _):
         rows.append((name, cells, f"{value:.6f}", f"{known:.6f}", f"{100*(value/known - 1):+.2f} %",
                      f"{100*(value/own - 1):+.3f} %", f"{run.history['newton'].sum():.0f}",
                      f"{run.history['cuts'].sum():.0f}", law(run)))
-    return table(["scene", "cells over pi, a", "found", "known", "difference", "by thickness, by forces", "Newton",
+    return table(["scene", "cells over pi, a", "found", "known", "difference", "difference with thickness, with forces", "Newton",
                   "cuts", "law"], rows)
 
 
@@ -416,19 +416,19 @@ def report_space_known(started, _):
     wanted = turns_away(.2, .3, .3)
     of = [run["turning", h] for h in (.02, .01)]
     error = [max(abs(r.history[name][-1]/.5 - w) for name, w in zip(("px", "py"), wanted)) for r in of]
-    add("the same thrown across a slope, h = 0.02, 0.01: error of the velocity by a particle's", "order 2",
+    add("the same thrown across a slope, h = 0.02, 0.01: difference of the velocity from that of a particle", "order 2",
         ", ".join(f"{e:.1e}" for e in error), *of)
     of = [run["puck", h] for h in PUCKS]
     first = of[0].history
     last = [np.array([r.history[name][-1] for name in ("px", "py", "lz")])/first["px"][0] for r in of]
-    add("puck of eight nodes that slides and spins, h = 0.01, 0.005: momenta by those of h = 0.00125", "order 2",
+    add("puck of eight nodes that slides and spins, h = 0.01, 0.005: difference of the momenta from those with h = 0.00125", "order 2",
         ", ".join(f"{np.abs(p - last[2]).max():.1e}" for p in last[:2]), *of)
     wanted = slows_down(1.0, first["lz"][0]/first["px"][0]/2)
-    add("the same, h = 0.00125: momenta by the equations of a flat one; its weight is 5e-4 of its radius above the floor",
+    add("the same, h = 0.00125: difference of the momenta from the equations of a flat puck; the centre of mass is 5e-4 of its radius above the floor",
         "below 1e-4", f"{np.abs(last[2] - wanted).max():.1e}", of[2])
     r = run["puck ends", .01]
     ends = [r.history["time"][np.argmax(np.abs(r.history[name]) < 1e-6*r.history[name][0])] for name in ("px", "lz")]
-    add("the same: where it stops, where its spin does", "one time", ", ".join(f"{t:.2f}" for t in ends), r)
+    add("the same: instants at which its motion and its spin end", "equal", ", ".join(f"{t:.2f}" for t in ends), r)
     r = run["rolling", .3]
     add("ball thrown along a floor of elements of 0.02: velocity as it rolls", "0.714286",
         f"{r.history['px'][-1]/CORE**3:.6f}", r)

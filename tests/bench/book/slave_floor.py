@@ -43,7 +43,7 @@ def start(runs):
 def report(started, _):
     rows = [(kind, *(f"{max(slanted(f.result()) for f in started[kind, ratio]):.4f}"
                      for ratio in RATIOS)) for kind in KINDS]
-    return table(["slave floor, edges by those of the disc:", *map(str, RATIOS)], rows)
+    return table(["edges of the slave floor / edges of the disc:", *map(str, RATIOS)], rows)
 
 
 CHAPTERS = [Chapter("slave_floor", start, report)]

@@ -43,7 +43,7 @@ def spring(futures, _):
         rows.append((scheme, f"{step:g}", f"{-gap.min()*OMEGA/SPEED:.4f}", f"{v[-1]/SPEED:.4f}",
                      f"{2*history['contact_energy'].max()/(MASS*SPEED**2):.4f}",
                      size(balance(history)[0])))
-    return table(["scheme", "h by 1/omega", "depth (1)", "rebound (1)", "stored, at most (1)",
+    return table(["scheme", "h omega", "depth (1)", "rebound (1)", "stored, at most (1)",
                   "energy"], rows)
 
 
@@ -69,7 +69,7 @@ def bars(futures, _):
                      f"{history['contact_energy'].max()/500:.1e}", f"{impulse:.1f}",
                      f"{history['time'][touches[-1]] - history['time'][touches[0] - 1]:.3f}",
                      size(balance(history)[0]), verdict["verdict"]))
-    return table(["method", "gives way by, of an edge", "stored, by the kinetic energy",
+    return table(["method", "penetration / edge", "stored / kinetic energy",
                   "impulse (266.7)", "contact lasts (0.667)", "energy", "verdict"], rows)
 
 
@@ -94,7 +94,7 @@ def damping(futures, _):
                      f"{100*abs(found/exact - 1):.2f} %",
                      f"{history['damping_loss'][-1]/total[0]:.4f}", size(damped_balance(history))))
     return table(["`ALPHA`", "`BETA`", "increments in a period", "ratio found", "of the oscillator",
-                  "off by", "dissipated, over the energy", "energy"], rows)
+                  "off by", "dissipated / energy", "energy"], rows)
 
 
 CHAPTERS = [Chapter("soft_spring", start_spring, spring), Chapter("soft_bar", start_bar, bars),

@@ -105,7 +105,7 @@ def report_bar(started, _):
         series = len(cells)/sum(1/found[(n,)] for n in cells)
         rows.append((" and ".join(f"{n} x {n}" for n in cells), f"{found[cells]:.5f}",
                      f"{100*(found[cells]/series - 1):+.2f} %" if len(cells) > 1 else "", size(drift), size(left)))
-    return table(["cells across", "torque", "off two halves in series", "drift of the middle", "along the axis, unloaded"], rows)
+    return table(["cells across", "torque", "difference from two halves in series", "drift of the middle", "along the axis, unloaded"], rows)
 
 
 CHAPTERS = [Chapter("ties_space_patch", start_patch, report_patch), Chapter("ties_space_bar", start_bar, report_bar)]

@@ -78,7 +78,7 @@ def flat_elements(ratio, make=Scene):
 
 
 def falling(value):
-    """One element in free fall: rho L^2/(E h^2), and offset by size."""
+    """One element in free fall: rho L^2/(E h^2), and offset / size."""
     scale, offset = value
     size = 0.7
     h = (size**2/(100*scale))**0.5
@@ -161,25 +161,25 @@ ROWS = [
         "energy and stress, relative", bar=1e-8, reach=8),
     Row("poisson", "Poisson's ratio of a cantilever, 60 by 6 `CPE4`",
         (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.4999999), bent, deflection_error,
-        "deflection by beam theory", bar=0.1, warns="body .* locks.*", reach=2,
-        why="plain four-node elements lock: volume is held at four points of each"),
+        "error of the deflection against beam theory", bar=0.1, warns="body .* locks.*", reach=2,
+        why="plain four-node elements lock: volume is constrained at four points of each"),
     Row("poisson_mean", "the same of `CPE4H`",
         (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.4999999),
-        functools.partial(bent, kind="CPE4H"), deflection_error, "deflection by beam theory", bar=0.1,
+        functools.partial(bent, kind="CPE4H"), deflection_error, "error of the deflection against beam theory", bar=0.1,
         reach=7, short=(0, -1)),
-    Row("aspect", "length by height of elements that a disc falls on",
+    Row("aspect", "length / height of elements that a disc falls on",
         (1, 1e2, 1e3, 1e4, 1e5), with_velocities(flat_elements), with_penetration, "energy, overlap", reach=5),
     Row("scale", "rho L^2/(E h^2) of an element in free fall",
         tuple((10.0**k, 0.0) for k in (0, 4, 8, 12, 16, 20, -4, -8, -12, -16, -20)), falling,
-        fall_error, "place after ten increments", bar=1e-8, reach=8, short=(0, 5, 7, -1),
-        why="forces of round-off strains, eps E L, against inertia, rho L^3/h^2"),
-    Row("offset", "offset by size of an element in free fall",
+        fall_error, "position after ten increments", bar=1e-8, reach=8, short=(0, 5, 7, -1),
+        why="inertia, rho L^3/h^2, is smaller than forces due to round-off of strains, eps E L"),
+    Row("offset", "offset / size of an element in free fall",
         tuple((1.0, 10.0**k) for k in (0, 3, 6, 9, 12)), falling, fall_error,
-        "place after ten increments", bar=1e-8, reach=5,
-        why="the places of the nodes themselves are rounded to eps times the offset"),
-    Row("grid", "both: rho L^2/(E h^2), and offset by size",
+        "position after ten increments", bar=1e-8, reach=5,
+        why="the positions of the nodes themselves are rounded to eps times the offset"),
+    Row("grid", "both: rho L^2/(E h^2), and offset / size",
         tuple((scale, offset) for scale in SCALES for offset in OFFSETS), falling, fall_error,
-        "place after ten increments", bar=1e-8, reach=0, short=(3*len(OFFSETS) - 1, 4*len(OFFSETS) - 1, -1),
+        "position after ten increments", bar=1e-8, reach=0, short=(3*len(OFFSETS) - 1, 4*len(OFFSETS) - 1, -1),
         why="that of the one or of the other: below"),
     Row("rotation", "radians that a block turns by in an increment",
         (0.1, 0.5, 1.0, 2.0, 3.0, 6.0), spinning, spin_error, "energy, angular momentum", reach=6),

@@ -40,13 +40,13 @@ def way_error(run, speed):
 
 ROWS = [
     Row("friction", "coefficient of friction of a block that is pushed by a fifth of its weight",
-        (0.1, 1e-3, 1e-6, 1e-12, 0.3, 1.0, 1e3), pushed, push_error, "way against the closed form",
+        (0.1, 1e-3, 1e-6, 1e-12, 0.3, 1.0, 1e3), pushed, push_error, "distance against the closed form",
         bar=1e-10, reach=7, short=(0, 3, -1), parameters=NODES,
         has_matrices=False),
     Row("sliding", "speed [size/s] of a block that slides to rest in 20 increments, on a floor under "
         "gravity of 10 [size/s^2]", (1.0, 1e-1, 1e-2, 1e-3, 1e-6), thrown, way_error,
-        "way, and energy that friction took", bar=REST, reach=4, parameters=NODES,
+        "distance, and energy dissipated by friction", bar=REST, reach=4, parameters=NODES,
         has_matrices=False,
-        why="a fall of g h^2/2 within an increment against round-off of places: below it no contact "
-            "is found"),
+        why="the fall in an increment, g h^2/2, must exceed the round-off of positions; otherwise "
+            "no contact is found"),
 ]

@@ -24,7 +24,7 @@ def stretched(excess):
 
 
 def falling(value):
-    """One element in free fall: rho L^2/(E h^2), and offset by size."""
+    """One element in free fall: rho L^2/(E h^2), and offset / size."""
     scale, offset = value
     size = 0.7
     h = (size**2/(100*scale))**0.5
@@ -58,10 +58,10 @@ ROWS = [
         "energy and stress, relative", bar=1e-8, reach=8),
     Row("space_scale", "rho L^2/(E h^2) of an element of space in free fall",
         tuple((10.0**k, 0.0) for k in (0, 4, 8, 12, 16, 20, -4, -8, -12, -16, -20)), falling,
-        fall_error, "place after ten increments", bar=1e-8, reach=8, short=(0, 5, 7, -2),
+        fall_error, "position after ten increments", bar=1e-8, reach=8, short=(0, 5, 7, -2),
         why="as in the plane"),
-    Row("space_offset", "offset by size of it", tuple((1.0, 10.0**k) for k in (0, 3, 6, 9, 12)),
-        falling, fall_error, "place after ten increments", bar=1e-8, reach=5),
+    Row("space_offset", "offset / size of it", tuple((1.0, 10.0**k) for k in (0, 3, 6, 9, 12)),
+        falling, fall_error, "position after ten increments", bar=1e-8, reach=5),
     Row("space_rotation", "radians that a block of space turns by in an increment",
         (0.1, 0.5, 1.0, 2.0, 3.0, 6.0), spinning, spin_error, "energy, angular momentum", reach=6),
 ]
