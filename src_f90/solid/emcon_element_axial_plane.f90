@@ -153,11 +153,13 @@ contains
       type(point_t), intent(in) :: point
       type(space_response_t), intent(in) :: response
       type(space_part_t), intent(inout) :: part
-      real(wp) :: nominal(n_dim, n_dim), hoop, f(n_dim)
+      real(wp), dimension(n_dim, n_dim) :: stress, nominal
+      real(wp) :: hoop, f(n_dim)
       integer :: i
 
       part%energy = part%energy + self%weight(k)*response%energy
-      nominal = self%weight(k)*matmul(point%f_mid, tensor_of(response%stress))
+      stress = tensor_of(response%stress)
+      nominal = self%weight(k)*matmul(point%f_mid, stress)
       hoop = self%weight(k)*point%stretch_mid*response%stress(circle)
       do i = 1, self%n_node
          f = matmul(nominal, self%gradient(:, i, k))

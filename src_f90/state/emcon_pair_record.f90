@@ -228,7 +228,8 @@ contains
       integer :: j, i, first
 
       first = system%first_constraint(k)
-      acting = [(j, j = own%first, own%last), (j, j = by_law%first, by_law%last)]
+      allocate(acting, source=[(j, j = own%first, own%last), &
+         (j, j = by_law%first, by_law%last)])
       associate (node => system%contact(k)%contact%node, &
             duplicate => system%contact(k)%contact%duplicate)
          do i = 1, size(node)
