@@ -27,7 +27,7 @@ module emcon_node_blocks
       integer :: n_block = 0
       integer :: n_slot = 0                      !! of the matrix by single entries
       integer :: n_thread = 1                    !! that may work on products
-      !> Rows before those of each end, and before those of the middle: an end meets the middle alone
+      !> Rows before those of each end, and of the middle: an end meets itself and the middle
       integer :: first_row(n_end + 1) = 0
       integer, allocatable :: place(:)           !! (n) of each unknown in a vector of blocks
       integer, allocatable :: row_start(:)       !! (n_block + 1) blocks before each row
