@@ -57,6 +57,7 @@ module emcon_chosen_solver
       procedure :: takes_rows => chosen_takes_rows
       procedure :: take_row => chosen_take_row
       procedure :: factorise_rows => chosen_factorise_rows
+      procedure :: let_threads => chosen_let_threads
       procedure :: free => chosen_free
    end type chosen_solver_t
 
@@ -354,6 +355,13 @@ contains
 
       call self%iterative%multiply(x, y)
    end subroutine chosen_multiply
+
+   pure subroutine chosen_let_threads(self, n)
+      class(chosen_solver_t), intent(inout) :: self
+      integer, intent(in) :: n
+
+      call self%iterative%let_threads(n)
+   end subroutine chosen_let_threads
 
    subroutine chosen_free(self)
       class(chosen_solver_t), intent(inout) :: self

@@ -1,4 +1,3 @@
-! build: streams
 !> The method of conjugate gradients for symmetric definite systems, one step after the other: who
 !> calls knows the matrix and the preconditioner.
 !>
@@ -6,14 +5,14 @@
 !> Source: M. R. Hestenes, E. Stiefel, J. Res. Nat. Bur. Stand. 49 (1952) 409-436.
 module emcon_conjugate_gradients
    use emcon_kinds, only : dp
+   use emcon_shared_vectors, only : shared_add, shared_product, shared_turn
    implicit none
    private
    public :: gradients_t, gradients_begin, gradients_move, gradients_turn, gradients_are_done
 
-   integer, parameter :: n_sum = 8               !! partial sums, side by side
-
    type :: gradients_t
       real(dp), allocatable :: direction(:)      !! (n) that the next step goes along
+      integer :: n_thread = 1                    !! that may work on vectors, set before
       integer :: n = 0                           !! steps made
       logical :: is_definite = .true.            !! matrix and preconditioner are, so far
       real(dp), private :: square = 0.0_dp, first = 0.0_dp      !! r.M^-1 r, now and at first
@@ -22,7 +21,7 @@ module emcon_conjugate_gradients
 contains
 
    !> A solve begins with the residual r = b - A x, and z = M^-1 r.
-   pure subroutine gradients_begin(self, r, z, found)
+   subroutine gradients_begin(self, r, z, found)
       type(gradients_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: r(:), z(:)     !! (n)
       !> The energy x.A x of where it begins, if r is orthogonal to that: a part of the solution's
@@ -34,7 +33,7 @@ contains
       if (.not. allocated(self%direction)) allocate(self%direction(size(r)))
       self%direction = z
       self%n = 0
-      self%square = product_of(r, z)
+      self%square = shared_product(self%n_thread, r, z)
       self%first = self%square
       if (present(found)) self%first = self%first + found
       self%is_definite = self%square >= 0.0_dp
@@ -42,31 +41,31 @@ contains
 
    !> The step along the direction p, of which `image` is A p: nothing moves where the matrix is not
    !> definite.
-   pure subroutine gradients_move(self, image, x, r)
+   subroutine gradients_move(self, image, x, r)
       type(gradients_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: image(:)       !! (n)
       real(dp), intent(inout), contiguous :: x(:), r(:)  !! (n)
       real(dp) :: curvature, step
 
-      curvature = product_of(self%direction, image)
+      curvature = shared_product(self%n_thread, self%direction, image)
       self%is_definite = curvature > 0.0_dp
       if (.not. self%is_definite) return
       step = self%square/curvature
-      x = x + step*self%direction
-      r = r - step*image
+      call shared_add(self%n_thread, step, self%direction, x)
+      call shared_add(self%n_thread, -step, image, r)
       self%n = self%n + 1
    end subroutine gradients_move
 
    !> The next direction, for the present residual and z = M^-1 r.
-   pure subroutine gradients_turn(self, r, z)
+   subroutine gradients_turn(self, r, z)
       type(gradients_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: r(:), z(:)     !! (n)
       real(dp) :: square
 
-      square = product_of(r, z)
+      square = shared_product(self%n_thread, r, z)
       self%is_definite = square >= 0.0_dp
       if (.not. self%is_definite) return
-      self%direction = z + (square/self%square)*self%direction
+      call shared_turn(self%n_thread, square/self%square, z, self%direction)
       self%square = square
    end subroutine gradients_turn
 
@@ -77,24 +76,5 @@ contains
 
       gradients_are_done = self%square <= accuracy**2*self%first
    end function gradients_are_done
-
-   !> a.b by partial sums in a fixed order.
-   pure real(dp) function product_of(a, b)
-      real(dp), intent(in), contiguous :: a(:), b(:)
-      real(dp) :: part(n_sum)
-      integer :: i, k, n
-
-      part = 0.0_dp
-      n = size(a) - modulo(size(a), n_sum)
-      do i = 0, n - n_sum, n_sum
-         do k = 1, n_sum
-            part(k) = part(k) + a(i + k)*b(i + k)
-         end do
-      end do
-      do i = n + 1, size(a)
-         part(i - n) = part(i - n) + a(i)*b(i)
-      end do
-      product_of = sum(part(:n_sum/2) + part(n_sum/2 + 1:))
-   end function product_of
 
 end module emcon_conjugate_gradients

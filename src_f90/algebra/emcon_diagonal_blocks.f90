@@ -1,5 +1,6 @@
 !> Factors L L^T of a symmetric definite matrix that falls apart into blocks on its diagonal, one
-!> for each: blocks whose values stay the same keep theirs, and blocks share the threads.
+!> for each: blocks whose values stay the same keep theirs. Threads share the blocks, or work
+!> together on each of those that are iterated.
 !>
 !> Blocks are the parts in which the pattern hangs together; small ones are taken together. The
 !> order of the unknowns in L is block by block, so that the bits do not depend on who works on
@@ -15,7 +16,7 @@ module emcon_diagonal_blocks
    implicit none
    private
    public :: diagonal_blocks_t, blocks_analyse, blocks_factorise, blocks_solve, blocks_reach, &
-      blocks_has_panels, blocks_reach_rows, blocks_multiply, blocks_free
+      blocks_has_panels, blocks_reach_rows, blocks_multiply, blocks_free, blocks_let_threads
 
    !> Parts of fewer than the n-th part of the unknowns are put together.
    integer, parameter :: smallest_part = 64
@@ -54,6 +55,18 @@ module emcon_diagonal_blocks
 
 contains
 
+   !> Let `n` threads work on the blocks.
+   pure subroutine blocks_let_threads(self, n)
+      type(diagonal_blocks_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! >= 1
+      integer :: b
+
+      self%n_thread = n
+      do b = 1, self%n_block
+         if (allocated(self%block(b)%solver)) call self%block(b)%solver%let_threads(n)
+      end do
+   end subroutine blocks_let_threads
+
    !> Find the blocks of a square pattern, and order each; nothing is done if it is the last one.
    subroutine blocks_analyse(self, matrix, is_new, error)
       type(diagonal_blocks_t), intent(inout) :: self
@@ -81,6 +94,7 @@ contains
          self%block(b)%solver%may_be_rough = self%may_be_rough
          self%block(b)%solver%accuracy = self%accuracy
          self%block(b)%solver%is_scaled = .true.
+         call self%block(b)%solver%let_threads(self%n_thread)
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return
          if (self%block(b)%solver%takes_rows()) deallocate(self%block(b)%matrix%column)
@@ -296,14 +310,15 @@ contains
       is_singular = .not. matrix%value(csr_find(matrix, 1, 1)) > 0.0_dp
       if (is_singular) return
       self%scale = power_of_two(-exponent(matrix%value(csr_find(matrix, 1, 1))))
+      do b = 1, self%n_block
+         if (self%block(b)%solver%takes_rows()) call factorise_rows(self%block(b), matrix, &
+            self%place, self%scale)
+      end do
       !$omp parallel do default(none) shared(self, matrix) num_threads(self%n_thread) &
       !$omp schedule(dynamic, 1)
       do b = 1, self%n_block
-         if (self%block(b)%solver%takes_rows()) then
-            call factorise_rows(self%block(b), matrix, self%place, self%scale)
-         else
-            call factorise(self%block(b), matrix, self%scale)
-         end if
+         if (.not. self%block(b)%solver%takes_rows()) call factorise(self%block(b), matrix, &
+            self%scale)
       end do
       !$omp end parallel do
       call take_error(self, error)
@@ -413,21 +428,39 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: b
 
-      if (self%n_thread == 1) then               ! a team of one asks the system for each barrier
-         do b = 1, self%n_block
-            call solve(self%block(b), is_second, rhs, x)
-         end do
-         call take_error(self, error)
-         return
-      end if
-      !$omp parallel do default(none) shared(self, is_second, rhs, x) &
-      !$omp num_threads(self%n_thread) schedule(static, 1)
       do b = 1, self%n_block
-         call solve(self%block(b), is_second, rhs, x)
+         if (is_alone(self, b)) call solve(self%block(b), is_second, rhs, x)
       end do
-      !$omp end parallel do
+      if (are_shared(self)) then
+         !$omp parallel do default(none) shared(self, is_second, rhs, x) &
+         !$omp num_threads(self%n_thread) schedule(static, 1)
+         do b = 1, self%n_block
+            if (.not. is_alone(self, b)) call solve(self%block(b), is_second, rhs, x)
+         end do
+         !$omp end parallel do
+      end if
       call take_error(self, error)
    end subroutine blocks_solve
+
+   !> Is the work on block `b` no thread's share of that on all blocks?
+   pure logical function is_alone(self, b)
+      type(diagonal_blocks_t), intent(in) :: self
+      integer, intent(in) :: b
+
+      is_alone = self%n_thread == 1 .or. self%n_block == 1
+      if (.not. is_alone) is_alone = self%block(b)%solver%takes_rows()
+   end function is_alone
+
+   !> Do threads take blocks? A team of one would ask the system for each barrier.
+   pure logical function are_shared(self)
+      type(diagonal_blocks_t), intent(in) :: self
+      integer :: b
+
+      are_shared = .false.
+      do b = 1, self%n_block
+         are_shared = are_shared .or. .not. is_alone(self, b)
+      end do
+   end function are_shared
 
    !> The part of a block of one half.
    subroutine solve(block, is_second, rhs, x)
@@ -463,19 +496,17 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: b
 
-      if (self%n_thread == 1) then
-         do b = 1, self%n_block
-            call multiply(self%block(b), x, y)
-         end do
-         call take_error(self, error)
-         return
-      end if
-      !$omp parallel do default(none) shared(self, x, y) num_threads(self%n_thread) &
-      !$omp schedule(static, 1)
       do b = 1, self%n_block
-         call multiply(self%block(b), x, y)
+         if (is_alone(self, b)) call multiply(self%block(b), x, y)
       end do
-      !$omp end parallel do
+      if (are_shared(self)) then
+         !$omp parallel do default(none) shared(self, x, y) num_threads(self%n_thread) &
+         !$omp schedule(static, 1)
+         do b = 1, self%n_block
+            if (.not. is_alone(self, b)) call multiply(self%block(b), x, y)
+         end do
+         !$omp end parallel do
+      end if
       call take_error(self, error)
    end subroutine blocks_multiply
 

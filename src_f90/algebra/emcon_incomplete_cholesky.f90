@@ -4,11 +4,12 @@
 !>
 !> In single precision: it is a preconditioner, of which memory is what counts. Where a pivot is not
 !> positive, which what is left out may do to a definite matrix, the diagonal is made larger and
-!> it is tried again. Source: T. A. Manteuffel, Math. Comp. 34 (1980) 473-497.
+!> it is tried again. Rows of both ends of the mesh need none of each other: two threads take one
+!> each. Source: T. A. Manteuffel, Math. Comp. 34 (1980) 473-497.
 module emcon_incomplete_cholesky
    use, intrinsic :: iso_fortran_env, only : sp => real32
    use emcon_kinds, only : dp
-   use emcon_node_blocks, only : n_side, node_blocks_t
+   use emcon_node_blocks, only : n_end, n_side, node_blocks_are_shared, node_blocks_t
    implicit none
    private
    public :: incomplete_cholesky_t, incomplete_cholesky_factorise, incomplete_cholesky_forward, &
@@ -26,7 +27,7 @@ module emcon_incomplete_cholesky
 contains
 
    !> Factorise a matrix whose values are filled in, in the range of single precision.
-   pure subroutine incomplete_cholesky_factorise(self, matrix, is_definite)
+   subroutine incomplete_cholesky_factorise(self, matrix, is_definite)
       type(incomplete_cholesky_t), intent(inout) :: self
       type(node_blocks_t), intent(in) :: matrix
       logical, intent(out) :: is_definite        !! else there is no factor
@@ -44,9 +45,36 @@ contains
    end subroutine incomplete_cholesky_factorise
 
    !> Factorise with the present shift.
-   pure subroutine try(self, matrix, is_definite)
+   subroutine try(self, matrix, is_definite)
       type(incomplete_cholesky_t), intent(inout) :: self
       type(node_blocks_t), intent(in) :: matrix
+      logical, intent(out) :: is_definite
+      logical :: is_done(n_end)
+      integer :: e
+
+      associate (before => matrix%first_row)
+         if (node_blocks_are_shared(matrix)) then
+            !$omp parallel do default(none) shared(self, matrix, is_done) schedule(static, 1) &
+            !$omp num_threads(matrix%n_thread)
+            do e = 1, n_end
+               call factorise_rows(self, matrix, matrix%first_row(e), matrix%first_row(e + 1), &
+                  is_done(e))
+            end do
+            !$omp end parallel do
+            is_definite = all(is_done)
+         else
+            call factorise_rows(self, matrix, 0, before(n_end + 1), is_definite)
+         end if
+         if (is_definite) call factorise_rows(self, matrix, before(n_end + 1), matrix%n_block, &
+            is_definite)
+      end associate
+   end subroutine try
+
+   !> The rows behind `before` up to `last`: those that they meet are done.
+   pure subroutine factorise_rows(self, matrix, before, last, is_definite)
+      type(incomplete_cholesky_t), intent(inout) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      integer, intent(in) :: before, last
       logical, intent(out) :: is_definite
       real(dp), allocatable :: row(:, :, :)      ! of L, by columns
       logical, allocatable :: is_here(:)
@@ -55,8 +83,9 @@ contains
 
       allocate(row(n_side, n_side, matrix%n_block))
       allocate(is_here(matrix%n_block), source=.false.)
+      is_definite = .true.
       associate (start => matrix%row_start, column => matrix%column)
-         do b = 1, matrix%n_block
+         do b = before + 1, last
             do k = start(b) + 1, start(b + 1) - 1
                c = column(k)
                block = matrix%value(:, :, k)
@@ -81,7 +110,7 @@ contains
             self%value(:, :, start(b + 1)) = real(block, sp)
          end do
       end associate
-   end subroutine try
+   end subroutine factorise_rows
 
    !> A B^T
    pure function times_transposed(a, b) result(c)
@@ -127,14 +156,37 @@ contains
    end subroutine invert
 
    !> y = L^-1 y, a vector of blocks.
-   pure subroutine incomplete_cholesky_forward(self, matrix, y)
+   subroutine incomplete_cholesky_forward(self, matrix, y)
       type(incomplete_cholesky_t), intent(in) :: self
       type(node_blocks_t), intent(in) :: matrix
+      real(dp), intent(inout) :: y(n_side, matrix%n_block)
+      integer :: e
+
+      associate (before => matrix%first_row)
+         if (node_blocks_are_shared(matrix)) then
+            !$omp parallel do default(none) shared(self, matrix, y) schedule(static, 1) &
+            !$omp num_threads(matrix%n_thread)
+            do e = 1, n_end
+               call forward_rows(self, matrix, matrix%first_row(e), matrix%first_row(e + 1), y)
+            end do
+            !$omp end parallel do
+         else
+            call forward_rows(self, matrix, 0, before(n_end + 1), y)
+         end if
+         call forward_rows(self, matrix, before(n_end + 1), matrix%n_block, y)
+      end associate
+   end subroutine incomplete_cholesky_forward
+
+   !> The rows behind `before` up to `last`.
+   pure subroutine forward_rows(self, matrix, before, last, y)
+      type(incomplete_cholesky_t), intent(in) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      integer, intent(in) :: before, last
       real(dp), intent(inout) :: y(n_side, matrix%n_block)
       real(dp) :: total(n_side)
       integer :: b, c, j, k
 
-      do b = 1, matrix%n_block
+      do b = before + 1, last
          total = y(:, b)
          do k = matrix%row_start(b) + 1, matrix%row_start(b + 1) - 1
             c = matrix%column(k)
@@ -148,17 +200,40 @@ contains
             y(:, b) = y(:, b) + self%value(:, j, k)*total(j)
          end do
       end do
-   end subroutine incomplete_cholesky_forward
+   end subroutine forward_rows
 
    !> y = L^-T y, a vector of blocks.
-   pure subroutine incomplete_cholesky_backward(self, matrix, y)
+   subroutine incomplete_cholesky_backward(self, matrix, y)
       type(incomplete_cholesky_t), intent(in) :: self
       type(node_blocks_t), intent(in) :: matrix
+      real(dp), intent(inout) :: y(n_side, matrix%n_block)
+      integer :: e
+
+      associate (before => matrix%first_row)
+         call backward_rows(self, matrix, before(n_end + 1), matrix%n_block, y)
+         if (node_blocks_are_shared(matrix)) then
+            !$omp parallel do default(none) shared(self, matrix, y) schedule(static, 1) &
+            !$omp num_threads(matrix%n_thread)
+            do e = 1, n_end
+               call backward_rows(self, matrix, matrix%first_row(e), matrix%first_row(e + 1), y)
+            end do
+            !$omp end parallel do
+         else
+            call backward_rows(self, matrix, 0, before(n_end + 1), y)
+         end if
+      end associate
+   end subroutine incomplete_cholesky_backward
+
+   !> The rows from `last` down to those behind `before`.
+   pure subroutine backward_rows(self, matrix, before, last, y)
+      type(incomplete_cholesky_t), intent(in) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      integer, intent(in) :: before, last
       real(dp), intent(inout) :: y(n_side, matrix%n_block)
       real(dp) :: x(n_side)
       integer :: b, c, j, k
 
-      do b = matrix%n_block, 1, -1
+      do b = last, before + 1, -1
          k = matrix%row_start(b + 1)
          do j = 1, n_side
             x(j) = dot_product(self%value(:, j, k), y(:, b))
@@ -171,6 +246,6 @@ contains
             end do
          end do
       end do
-   end subroutine incomplete_cholesky_backward
+   end subroutine backward_rows
 
 end module emcon_incomplete_cholesky

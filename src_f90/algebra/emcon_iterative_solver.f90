@@ -20,6 +20,7 @@ module emcon_iterative_solver
    use emcon_node_blocks, only : n_side, node_blocks_fill, node_blocks_init, node_blocks_is_of, &
       node_blocks_matrix, node_blocks_multiply, node_blocks_t, node_blocks_take_row
    use emcon_power_scaling, only : power_of_two
+   use emcon_shared_vectors, only : shared_add, shared_pick, shared_put
    use emcon_sparse_solver, only : solver_check_square
    use emcon_text, only : to_text
    implicit none
@@ -39,6 +40,7 @@ module emcon_iterative_solver
       integer :: n_analysis = 0
       integer :: most_steps = 1000               !! of a solve
       integer :: n_step = 0                      !! of the last one
+      integer, private :: n_thread = 1
       logical :: is_filled = .false.             !! the blocks have values
       logical, private :: is_sound = .false.     !! those that were taken so far can be factorised
       type(node_blocks_t), private :: blocks     !! half_scale times the matrix
@@ -56,10 +58,21 @@ module emcon_iterative_solver
       procedure :: solve => iterative_solve
       procedure :: solve_half => iterative_solve_half
       procedure :: multiply => iterative_multiply
+      procedure :: let_threads => iterative_let_threads
       procedure :: free => iterative_free
    end type iterative_solver_t
 
 contains
+
+   !> Let `n` threads work on matrices and vectors.
+   pure subroutine iterative_let_threads(self, n)
+      class(iterative_solver_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! >= 1
+
+      self%n_thread = n
+      self%blocks%n_thread = n
+      self%gradients%n_thread = n
+   end subroutine iterative_let_threads
 
    subroutine iterative_analyse(self, matrix, error)
       class(iterative_solver_t), intent(inout) :: self
@@ -71,6 +84,7 @@ contains
       call solver_check_square(matrix, error)
       if (allocated(error)) return
       call node_blocks_init(self%blocks, matrix)
+      self%blocks%n_thread = self%n_thread
       self%first_slot = csr_find(matrix, 1, 1)
       self%n_analysis = self%n_analysis + 1
       associate (n => n_side*self%blocks%n_block)
@@ -167,12 +181,12 @@ contains
       end if
       accuracy = max(self%accuracy, best_accuracy)
       self%x = 0.0_dp
-      self%r(self%blocks%place) = self%half_scale*real(rhs, dp)
+      call shared_put(self%n_thread, self%half_scale*real(rhs, dp), self%blocks%place, self%r)
       found = 0.0_dp
       if (has_coarse(self)) then
          call coarse_modes_begin(self%coarse, self%r, self%x, found)
          call node_blocks_multiply(self%blocks, self%x, self%z)
-         self%r = self%r - self%z
+         call shared_add(self%n_thread, -1.0_dp, self%z, self%r)
       end if
       self%z = self%r
       call precondition(self, self%z)
@@ -217,10 +231,10 @@ contains
       real(dp), intent(in), contiguous :: rhs(:)
       real(dp), intent(inout), contiguous :: x(:)
 
-      self%z(self%blocks%place) = rhs
+      call shared_put(self%n_thread, rhs, self%blocks%place, self%z)
       if (is_second) call incomplete_cholesky_backward(self%factor, self%blocks, self%z)
       if (.not. is_second) call incomplete_cholesky_forward(self%factor, self%blocks, self%z)
-      x = self%z(self%blocks%place)
+      call shared_pick(self%n_thread, self%z, self%blocks%place, x)
    end subroutine iterative_solve_half
 
    !> y = half_scale*A x
@@ -229,9 +243,9 @@ contains
       real(dp), intent(in), contiguous :: x(:)
       real(dp), intent(inout), contiguous :: y(:)
 
-      self%x(self%blocks%place) = x
+      call shared_put(self%n_thread, x, self%blocks%place, self%x)
       call node_blocks_multiply(self%blocks, self%x, self%z)
-      y = self%z(self%blocks%place)
+      call shared_pick(self%n_thread, self%z, self%blocks%place, y)
    end subroutine iterative_multiply
 
    !> The matrix as it was given, by single entries.

@@ -3,8 +3,10 @@
 !>
 !> Unknowns that follow each other and meet the same others, as those of a node do, are a block,
 !> filled up by unknowns of their own where they are fewer. Blocks are numbered breadth first from
-!> an end of the mesh, so that neighbours are near in memory and incomplete factors are good.
+!> both ends of the mesh to its middle, so that neighbours are near in memory, incomplete factors
+!> are good, and two threads work from the ends to the same bits as one does.
 !> Only the lower triangle of blocks is kept: a third of what rows of single entries take.
+!> Source: H. A. van der Vorst, Parallel Comput. 5 (1987) 45-54.
 module emcon_node_blocks
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp
@@ -12,15 +14,21 @@ module emcon_node_blocks
    implicit none
    private
    public :: node_blocks_t, node_blocks_init, node_blocks_fill, node_blocks_take_row, &
-      node_blocks_multiply, node_blocks_is_of, node_blocks_matrix, node_blocks_quotient, n_side
+      node_blocks_multiply, node_blocks_is_of, node_blocks_matrix, node_blocks_quotient, &
+      node_blocks_are_shared, n_side, n_end
 
-   !> Unknowns of a block.
-   integer, parameter :: n_side = 3
+   !> Unknowns of a block, and ends of the mesh that rows are numbered from.
+   integer, parameter :: n_side = 3, n_end = 2
+   !> Blocks that are worth a second thread.
+   integer, parameter :: least_shared = 512
 
    type :: node_blocks_t
       integer :: n = 0                           !! unknowns
       integer :: n_block = 0
       integer :: n_slot = 0                      !! of the matrix by single entries
+      integer :: n_thread = 1                    !! that may work on products
+      !> Rows before those of each end, and of the middle: an end meets itself and the middle
+      integer :: first_row(n_end + 1) = 0
       integer, allocatable :: place(:)           !! (n) of each unknown in a vector of blocks
       integer, allocatable :: row_start(:)       !! (n_block + 1) blocks before each row
       integer, allocatable :: column(:)          !! ascending in each row, its own block last
@@ -54,6 +62,7 @@ contains
       self%n_slot = matrix%row_start(self%n + 1)
       call find_blocks(self, matrix)
       call order_blocks(self, order)
+      call turn_second_end(self, order)
       allocate(self%number(self%n_block), self%place(self%n), source=0)
       self%number(order) = [(b, b = 1, self%n_block)]
       do b = 1, self%n_block
@@ -150,6 +159,31 @@ contains
       end do
       call move_alloc(way%block, order)
    end subroutine order_blocks
+
+   !> Put the blocks of the first half that meet the second one behind both, and the second half in
+   !> front of them from its far end on.
+   pure subroutine turn_second_end(self, order)
+      type(node_blocks_t), intent(inout) :: self
+      integer, intent(inout) :: order(:)         !! (n_block)
+      integer, parameter :: n_pass = 3           ! ends of one size, as the middle's is known better
+      integer :: at(self%n_block), i, n_first, n_middle, pass
+      logical :: is_middle(self%n_block)
+
+      at(order) = [(i, i = 1, self%n_block)]
+      n_middle = 0
+      do pass = 1, n_pass
+         n_first = (self%n_block + n_middle)/n_end
+         do i = 1, self%n_block
+            associate (met => self%met(self%start(order(i)) + 1:self%start(order(i) + 1)))
+               is_middle(i) = i <= n_first .and. any(at(met) > n_first)
+            end associate
+         end do
+         n_middle = count(is_middle)
+      end do
+      self%first_row = [0, n_first - n_middle, self%n_block - n_middle]
+      order = [pack(order(:n_first), .not. is_middle(:n_first)), &
+         order(self%n_block:n_first + 1:-1), pack(order(:n_first), is_middle(:n_first))]
+   end subroutine turn_second_end
 
    !> List the blocks that hang together with `seed` behind those listed so far.
    pure subroutine walk(self, blocks, seed)
@@ -359,15 +393,43 @@ contains
       end associate
    end function slot_of
 
+   !> Do threads share the work on the ends?
+   pure logical function node_blocks_are_shared(self) result(are_shared)
+      type(node_blocks_t), intent(in) :: self
+
+      are_shared = self%n_thread > 1 .and. self%n_block >= least_shared
+   end function node_blocks_are_shared
+
    !> y = A x, vectors of blocks.
-   pure subroutine node_blocks_multiply(self, x, y)
+   subroutine node_blocks_multiply(self, x, y)
       type(node_blocks_t), intent(in) :: self
       real(dp), intent(in) :: x(n_side, self%n_block)
       real(dp), intent(out) :: y(n_side, self%n_block)
+      integer :: e
+
+      if (node_blocks_are_shared(self)) then
+         !$omp parallel do default(none) shared(self, x, y) num_threads(self%n_thread) &
+         !$omp schedule(static, 1)
+         do e = 1, n_end
+            call multiply_rows(self, self%first_row(e), self%first_row(e + 1), x, y)
+         end do
+         !$omp end parallel do
+      else
+         call multiply_rows(self, 0, self%first_row(n_end + 1), x, y)
+      end if
+      call multiply_rows(self, self%first_row(n_end + 1), self%n_block, x, y)
+   end subroutine node_blocks_multiply
+
+   !> What the lower triangle has in the rows behind `before` up to `last`, and across the diagonal.
+   pure subroutine multiply_rows(self, before, last, x, y)
+      type(node_blocks_t), intent(in) :: self
+      integer, intent(in) :: before, last
+      real(dp), intent(in) :: x(n_side, self%n_block)
+      real(dp), intent(inout) :: y(n_side, self%n_block)
       real(dp) :: own(n_side), total(n_side)
       integer :: b, c, j, k
 
-      do b = 1, self%n_block
+      do b = before + 1, last
          own = x(:, b)
          total = 0.0_dp
          do k = self%row_start(b) + 1, self%row_start(b + 1) - 1
@@ -382,6 +444,6 @@ contains
             y(j, b) = total(j) + dot_product(self%value(:, j, k), own)
          end do
       end do
-   end subroutine node_blocks_multiply
+   end subroutine multiply_rows
 
 end module emcon_node_blocks

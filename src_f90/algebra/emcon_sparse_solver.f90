@@ -67,6 +67,7 @@ module emcon_sparse_solver
       procedure :: takes_rows
       procedure :: take_row
       procedure :: factorise_rows
+      procedure :: let_threads
    end type sparse_solver_t
 
    !> For arrays of solvers.
@@ -197,6 +198,12 @@ contains
 
       call raise(error, err_internal, "a solver that takes matrices as a whole has no rows")
    end subroutine factorise_rows
+
+   !> Let `n` threads work on it, to the same bits. One does, unless overridden.
+   pure subroutine let_threads(self, n)
+      class(sparse_solver_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! >= 1
+   end subroutine let_threads
 
    !> Factorise `value`, of the analysed pattern, unless the last factors are those of these values:
    !> matrices of linear bodies stay the same.

@@ -3,7 +3,7 @@
 !> Times are counted in integers: grid increments of h, and dyadic fractions of one when it is cut.
 module emcon_march
    use emcon_active_set, only : active_set_init
-   use emcon_correction, only : correction_free
+   use emcon_correction, only : correction_free, correction_let_threads
    use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
    use emcon_factor_policy, only : factor_policy_forget
    use emcon_host, only : host_copy_solvers, host_t
@@ -215,7 +215,7 @@ contains
       integer, intent(in) :: n                   !! > 0
 
       self%system%response%n_thread = n
-      self%newton%correction%kept%blocks%n_thread = n
+      call correction_let_threads(self%newton%correction, n)
    end subroutine march_set_threads
 
    !> Put a state of before in place of the present one; the kept factor is made again as it was.

@@ -29,7 +29,7 @@ module emcon_march_step
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_steps, only : method_null_space
-   use emcon_system, only : system_find_energy, system_loads, system_respond
+   use emcon_system, only : system_find_energy, system_loads, system_release_tangent, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
    use emcon_motion_bound, only : largest_motion
@@ -156,6 +156,9 @@ contains
       integer :: left
 
       associate (factor_policy => self%newton%factor_policy, correction => self%newton%correction)
+         ! Iterations have a matrix of their own; friction and condensed contacts read the tangent.
+         if (self%system%n_constraint == 0 .and. correction%kept%is_made &
+            .and. correction%kept%blocks%is_incomplete) call system_release_tangent(self%system)
          factor_policy%is_allowed = factor_policy%is_wanted &
             .and. .not. self%active%near_laws%is_on &
             .and. (correction%method == method_null_space .or. self%system%n_constraint == 0)

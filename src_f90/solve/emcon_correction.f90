@@ -5,6 +5,7 @@ module emcon_correction
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
+   use emcon_diagonal_blocks, only : blocks_let_threads
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find
    use emcon_kept_factor, only : kept_factor_free, kept_factor_set_up, kept_factor_t
@@ -25,7 +26,7 @@ module emcon_correction
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
       correction_try_minimum, correction_is_lost, &
       correction_multipliers, correction_reset, correction_free, correction_reason, &
-      correction_take_modes, correction_ticks, correction_work
+      correction_take_modes, correction_ticks, correction_work, correction_let_threads
 
    !> Of a correction by Newton's method, where the solver iterates.
    real(dp), parameter :: newton_accuracy = 1.0e-4_dp
@@ -86,10 +87,20 @@ contains
       call solver_create(self%choice, matrix_general, self%solver, self%user)
       call solver_create(self%choice, matrix_definite, self%definite_solver, self%user)
       self%definite_solver%accuracy = newton_accuracy
+      call self%definite_solver%let_threads(self%kept%blocks%n_thread)
       call kept_factor_set_up(self%kept, self%choice, self%user)
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%user)
       call saddle_point_reset(self%saddle_point, self%choice, self%user)
    end subroutine make_solvers
+
+   !> Let `n` threads work on systems, to the same bits.
+   pure subroutine correction_let_threads(self, n)
+      type(correction_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! >= 1
+
+      call blocks_let_threads(self%kept%blocks, n)
+      if (allocated(self%definite_solver)) call self%definite_solver%let_threads(n)
+   end subroutine correction_let_threads
 
    !> Tell solvers of definite matrices which motions take hardly any energy.
    pure subroutine correction_take_modes(self, mode)
@@ -455,6 +466,7 @@ contains
       if (set%n == 0) then
          if (self%is_definite) then
             self%definite_solver%accuracy = newton_accuracy
+      call self%definite_solver%let_threads(self%kept%blocks%n_thread)
             if (present(accuracy)) self%definite_solver%accuracy = real(accuracy, dp)
             call self%definite_solver%solve(residual, dq, error)
          else

@@ -63,6 +63,7 @@ contains
       self%r = self%r*self%root
       call precondition(self, blocks, error)
       if (allocated(error)) return
+      self%gradients%n_thread = blocks%n_thread
       call gradients_begin(self%gradients, self%r, self%z)
       do while (self%gradients%is_definite .and. self%gradients%n < most_steps)
          if (gradients_are_done(self%gradients, self%accuracy)) exit

@@ -233,7 +233,7 @@ contains
             [lists%start, [(n + 1 + i, i = 1, size(bare))]], number([lists%freedom, bare]), slot, &
             error)
          if (allocated(error)) return
-         slot = slot(:n_entry)
+         if (size(slot) > n_entry) slot = slot(:n_entry)
       end associate
       call reduction_init(self%reduction, self%numbering, full, matrix, slot, is_too_full)
    end subroutine lay_out

@@ -33,8 +33,8 @@ module emcon_system
    implicit none
    private
    public :: system_t, system_init, system_begin_step, system_renew, system_respond, &
-      system_find_energy, system_check_response, system_stiffen, system_tangent_times, &
-      system_loads, system_may_hold, system_springs, mass_times
+      system_release_tangent, system_find_energy, system_check_response, system_stiffen, &
+      system_tangent_times, system_loads, system_may_hold, system_springs, mass_times
 
    type :: system_t
       type(term_box_t), allocatable :: term(:)
@@ -49,7 +49,7 @@ module emcon_system
       integer, allocatable :: first_constraint(:)   !! (n_contact + 1) conditions before each
       integer :: i_step = 0                      !! step of the deck the rest belongs to
       type(space_t) :: space                     !! bodies, freedoms, unknowns
-      type(csr_t) :: matrix                      !! tangent over the unknowns
+      type(csr_t) :: matrix                      !! tangent over the unknowns, once asked for
       logical :: is_symmetric = .false.          !! `matrix` is, up to round-off
       type(stiffening_t) :: stiffening           !! of bodies that nothing holds, in `matrix`
       type(response_t) :: response               !! of the terms to the last motion
@@ -172,6 +172,8 @@ contains
       if (scene%step(i_step)%scheme%lumps_mass) call lists_alone(lists)
       call space_begin_step(self%space, scene, i_step, lists, self%matrix, slot, error)
       if (allocated(error)) return
+      ! None is held before it is asked for.
+      if (allocated(self%matrix%value)) deallocate(self%matrix%value)
       if (scene%step(i_step)%scheme%lumps_mass) then
          deallocate(slot)
          allocate(slot(first(size(first))), source=0)
@@ -289,6 +291,11 @@ contains
       if (with_tangent) then
          self%phases%n_tangent = self%phases%n_tangent + 1
          self%is_symmetric = .true.
+         if (.not. allocated(self%matrix%value)) then
+            call memory_go_on(self%memory)
+            allocate(self%matrix%value(size(self%matrix%column)))
+            call memory_take(self%memory, memory_matrix)
+         end if
          self%matrix%value = 0.0_dp
       else if (.not. self%lagged%is_on) then
          self%phases%n_residual = self%phases%n_residual + 1
@@ -328,6 +335,16 @@ contains
       end associate
       call phase_leave(self%phases, left)
    end subroutine system_respond
+
+   !> The tangent is not needed before the next one is asked for: half of what a model takes.
+   subroutine system_release_tangent(self)
+      type(system_t), intent(inout) :: self
+
+      if (.not. allocated(self%matrix%value)) return
+      call memory_go_on(self%memory)
+      deallocate(self%matrix%value)
+      call memory_take(self%memory, memory_matrix)
+   end subroutine system_release_tangent
 
    !> Complete the energies of the elements of the last response, that to `motion`.
    subroutine system_find_energy(self, motion)

@@ -30,7 +30,10 @@ module emcon_inertia
    !> Where a mass between nodes stands in the matrix. Between most nodes it does as it is, with the
    !> directions of both one behind the other: one place and a stride tell all of these.
    type :: spots_t
-      integer, allocatable :: first(:)           !! (entries) place of direction 1; 0: in `place`
+      !> (n_node) > 0: place of direction 1 of the first entry of a row, whose nodes have all their
+      !> directions one behind the other; else minus the entries of `first` before those of the row
+      integer, allocatable :: row(:)
+      integer, allocatable :: first(:)           !! place of direction 1; 0: in `place`
       integer, allocatable :: stride(:)          !! (n_node) to the next direction
       integer, allocatable :: place(:)           !! of all other entries
       real(dp), allocatable :: value(:)          !! as `place` [M]
@@ -57,6 +60,8 @@ module emcon_inertia
    integer, parameter :: n_end = 2
    !> Directions that the mass is multiplied in at a time.
    integer, parameter :: n_way = 2
+   !> Rows that are worth more than one thread, and those that one takes at a time.
+   integer, parameter :: least_shared = 2048, n_piece = 512
 
 contains
 
@@ -264,6 +269,7 @@ contains
             value(place) = 0.0_dp          ! what is left has places of its own
          end do
       end do
+      call shorten_rows(size(place), mass%pattern, spots)
       call list_others(value, spots)
 
    contains
@@ -292,6 +298,46 @@ contains
       end function stands_alone
 
    end subroutine find_spots
+
+   !> Where places follow from the first one of a row, only that is kept.
+   pure subroutine shorten_rows(n_dim, pattern, spots)
+      integer, intent(in) :: n_dim
+      type(csr_t), intent(in) :: pattern
+      type(spots_t), intent(inout) :: spots      !! `first` has the places of all entries
+      integer :: i, k, m, n
+
+      allocate(spots%row(pattern%n_row), source=0)
+      n = 0
+      do i = 1, pattern%n_row
+         associate (before => pattern%row_start(i))
+            m = pattern%row_start(i + 1) - before
+            spots%row(i) = -n
+            if (m > 0) then
+               if (spots%first(before + 1) > 0 .and. all(spots%first(before + 1:before + m) &
+                  == spots%first(before + 1) + n_dim*[(k, k = 0, m - 1)])) then
+                  spots%row(i) = spots%first(before + 1)
+                  cycle
+               end if
+            end if
+            spots%first(n + 1:n + m) = spots%first(before + 1:before + m)
+            n = n + m
+         end associate
+      end do
+      spots%first = spots%first(:n)
+   end subroutine shorten_rows
+
+   !> The place of direction 1 of entry `k` of row `i`; 0: there is none.
+   pure integer function spot_of(n_dim, spots, i, k) result(place)
+      integer, intent(in) :: n_dim
+      type(spots_t), intent(in) :: spots
+      integer, intent(in) :: i, k                !! from 1
+
+      if (spots%row(i) > 0) then
+         place = spots%row(i) + n_dim*(k - 1)
+      else
+         place = spots%first(k - spots%row(i))
+      end if
+   end function spot_of
 
    !> List the places that have a value. No arrays of all places: the matrix is laid out meanwhile,
    !> and nothing later takes as much memory.
@@ -322,7 +368,7 @@ contains
 
       do i = 1, mass%pattern%n_row
          do k = mass%pattern%row_start(i) + 1, mass%pattern%row_start(i + 1)
-            place = spots%first(k)
+            place = spot_of(n_dim, spots, i, k - mass%pattern%row_start(i))
             if (place == 0) cycle
             do a = 1, n_dim
                value(place) = value(place) + factor*real(mass%value(k), dp)
@@ -384,13 +430,13 @@ contains
          call vector_scale(n, evaluation%rate, self%rate)
          call vector_add(n, -evaluation%v_weight, motion%v0, self%rate)
          if (allocated(motion%dv_past)) call vector_add(n, 1.0_wp, motion%dv_past, self%rate)
-         call inertia_times(self, self%rate, self%product)
+         call times(self, response%n_thread)
          call vector_add(n, evaluation%mass_scale, self%product, total%force)
          if (.not. response%with_sizes) return
          self%rate = abs(evaluation%rate*(motion%du + motion%offset)) &
             + abs(evaluation%v_weight*motion%v0)
          if (allocated(motion%dv_past)) self%rate = self%rate + abs(motion%dv_past)
-         call inertia_times(self, self%rate, self%product)
+         call times(self, response%n_thread)
          total%magnitude = total%magnitude + evaluation%mass_scale*self%product
       end associate
    end subroutine respond
@@ -407,6 +453,20 @@ contains
       product = product + self%product
    end subroutine tangent_times
 
+   !> `product` of `rate`.
+   subroutine times(self, n_thread)
+      type(inertia_t), intent(inout) :: self
+      integer, intent(in) :: n_thread            !! that may work on it
+
+      if (n_thread == 1 .or. size(self%rate, 2) < least_shared) then
+         call inertia_times(self, self%rate, self%product)
+      else if (self%is_lumped) then
+         call share_times(self%lumped, n_thread, self%rate, self%product)
+      else
+         call share_times(self%consistent, n_thread, self%rate, self%product)
+      end if
+   end subroutine times
+
    !> M field, in all directions.
    pure subroutine inertia_times(self, field, product)
       class(inertia_t), intent(in) :: self
@@ -414,32 +474,50 @@ contains
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
 
       if (self%is_lumped) then
-         call mass_times(self%lumped, field, product)
+         call mass_times(self%lumped, 0, size(field, 2), field, product)
       else
-         call mass_times(self%consistent, field, product)
+         call mass_times(self%consistent, 0, size(field, 2), field, product)
       end if
    end subroutine inertia_times
 
-   pure subroutine mass_times(mass, field, product)
+   !> The same by threads.
+   subroutine share_times(mass, n_thread, field, product)
       type(node_mass_t), intent(in) :: mass
+      integer, intent(in) :: n_thread
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
-      real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
+      real(wp), intent(inout), contiguous :: product(:, :)   !! (n_dim, n_node)
+      integer :: i
+
+      !$omp parallel do default(none) shared(mass, field, product) num_threads(n_thread) &
+      !$omp schedule(static)
+      do i = 0, size(field, 2) - 1, n_piece
+         call mass_times(mass, i, min(i + n_piece, size(field, 2)), field, product)
+      end do
+      !$omp end parallel do
+   end subroutine share_times
+
+   !> The rows behind `before` up to `last`.
+   pure subroutine mass_times(mass, before, last, field, product)
+      type(node_mass_t), intent(in) :: mass
+      integer, intent(in) :: before, last
+      real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
+      real(wp), intent(inout), contiguous :: product(:, :)   !! (n_dim, n_node)
 
       associate (rows => mass%pattern)
-         call rows_times(size(field, 1), rows%n_row, rows%row_start, rows%column, mass%value, &
-            field, product)
+         call rows_times(size(field, 1), last - before, rows%row_start(before + 1:last + 1), &
+            rows%column, mass%value, field, product(:, before + 1:last))
       end associate
    end subroutine mass_times
 
    !> Rows of a sparse matrix times vectors, two directions at a time: the rows are read once.
    pure subroutine rows_times(n_dim, n_row, row_start, column, value, field, product)
       integer, intent(in) :: n_dim
-      integer, intent(in) :: n_row                           !! as many as columns
-      integer, intent(in) :: row_start(n_row + 1)            !! from 0
+      integer, intent(in) :: n_row
+      integer, intent(in) :: row_start(n_row + 1)            !! entries before those of each
       integer, intent(in), contiguous :: column(:)           !! from 0
       real(wp), intent(in), contiguous :: value(:)
-      real(wp), intent(in) :: field(n_dim, 0:n_row - 1)
-      real(wp), intent(out) :: product(n_dim, n_row)
+      real(wp), intent(in) :: field(n_dim, 0:*)
+      real(wp), intent(out) :: product(n_dim, n_row)         !! of these rows
       real(wp) :: first, second
       integer :: i, k, a, b
 

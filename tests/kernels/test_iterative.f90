@@ -40,6 +40,8 @@ contains
          test_case_t("a coarse space", test_coarse), &
          test_case_t("both halves are the preconditioner", test_halves), &
          test_case_t("row by row or as a whole", test_rows), &
+         test_case_t("ends that do not meet", test_ends), &
+         test_case_t("threads keep the bits", test_threads), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
          test_case_t("a pivot that is lost to the pattern", test_shift), &
          test_case_t("where steps do not do factors are taken", test_not_converged), &
@@ -554,6 +556,57 @@ contains
       call whole%free()
       call rows%free()
    end subroutine test_rows
+
+   !> Rows of an end meet none of the other, and both have as many; the middle is the smallest.
+   subroutine test_ends(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_long = 20
+      type(csr_t) :: a
+      type(node_blocks_t) :: blocks
+      integer :: b, extent(3)
+
+      call lattice(n_long, n_y, n_z, 1.0_dp, a)
+      call node_blocks_init(blocks, a)
+      extent = [blocks%first_row(2:), blocks%n_block] - blocks%first_row
+      call check_true(error, abs(extent(1) - extent(2)) <= extent(3) &
+         .and. extent(3) <= 2*n_y*n_z, "two ends and a middle")
+      do b = blocks%first_row(2) + 1, blocks%first_row(3)
+         if (.not. allocated(error)) call check_true(error, all(blocks%column( &
+            blocks%row_start(b) + 1:blocks%row_start(b + 1)) > blocks%first_row(2)), "apart")
+      end do
+   end subroutine test_ends
+
+   !> Of a matrix that is large enough for threads to share it.
+   subroutine test_threads(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_thread = 3
+      type(iterative_solver_t) :: solver(n_thread)
+      type(csr_t) :: a
+      real(dp), allocatable :: v(:), y(:, :, :)
+      real(wp), allocatable :: b(:), x(:, :)
+      integer :: t
+
+      call lattice(20, 10, 8, 0.5_dp, a)
+      allocate(b(a%n_row), v(a%n_row), x(a%n_row, n_thread), y(a%n_row, n_thread, n_thread), &
+         source=0.0_dp)
+      call random_number(b)
+      v = real(b, dp)
+      do t = 1, n_thread
+         solver(t)%accuracy = 1.0e-6_dp
+         call solver(t)%let_threads(t)
+         call start(solver(t), a, error)
+         if (.not. allocated(error)) call solver(t)%solve(b, x(:, t), error)
+         if (allocated(error)) return
+         call solver(t)%solve_half(.false., v, y(:, 1, t))
+         call solver(t)%solve_half(.true., v, y(:, 2, t))
+         call solver(t)%multiply(v, y(:, 3, t))
+         call check_true(error, .not. any(abs(x(:, t) - x(:, 1)) > 0.0_wp) &
+            .and. .not. any(abs(y(:, :, t) - y(:, :, 1)) > 0.0_dp), "bits")
+         call solver(t)%free()
+         if (allocated(error)) return
+      end do
+      call check_true(error, all(abs(x(:, 1)) > 0.0_wp), "something is solved")
+   end subroutine test_threads
 
    !> The order of the nodes tells about as many operations and entries as that of the unknowns:
    !> within a half, as orders are found by heuristics.

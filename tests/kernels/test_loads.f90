@@ -240,7 +240,7 @@ contains
       if (allocated(error)) return
       call system_begin_step(system, scene, 1, error)
       if (allocated(error)) return
-      system%matrix%value = 0.0_dp
+      allocate(system%matrix%value(size(system%matrix%column)), source=0.0_dp)
       call shake(u, 0.2_wp)
       call response_begin(system%response)
       do k = 1, size(system%term)

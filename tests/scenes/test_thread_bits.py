@@ -1,6 +1,7 @@
 """Threads share the work of a model, and no bit of a result depends on how many there are."""
 
 import os
+import pathlib
 import subprocess
 import sys
 
@@ -9,6 +10,11 @@ import numpy as np
 import pytest
 from emcon import InputError, Stepper
 from scene_tools import DECKS, coarse_ring, emcon, made, run_deck
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]/"bench"))
+
+import bench_contacts_space  # noqa: E402
+import bench_space  # noqa: E402
 
 SCENES = {
     "ring": {"h": 0.04, "t_end": 0.4, "frame": 0.4},
@@ -60,6 +66,23 @@ def test_bits_of_large_bodies_do_not_depend_on_threads(tmp_path):
     found = [run_deck(deck, tmp_path/f"{k}", options=["--threads", f"{n}"],
                       h=0.01, t_end=0.14, frame=1).digits() for k, n in enumerate((1, 2, 2, 3))]
     assert all(other == found[0] for other in found[1:])
+
+
+@pytest.mark.parametrize("scene", ["dynamics", "statics", "contact"])
+def test_bits_of_iterated_bodies_do_not_depend_on_threads(scene, tmp_path):
+    """Of bodies that are large enough for threads to share the incomplete factor and vectors."""
+    deck = tmp_path/"bodies.inp"
+    if scene == "contact":
+        bench_contacts_space.write(deck, (9, 9, 8), 3, True)
+        deck.write_text(deck.read_text().replace("*DYNAMIC, DIRECT", "*DYNAMIC, DIRECT, SOLVER=ITERATIVE"))
+    else:
+        bench_space.write(deck, (14, 11, 11), "C3D8", 2, "ITERATIVE", scene == "statics")
+    runs = [run_deck(deck, tmp_path/f"{n}", options=[f"--threads={n}"]) for n in (1, 2, 3)]
+    assert runs[0].verdict["counts"]["solutions"] > 0
+    for run in runs[1:]:
+        assert run.digits() == runs[0].digits()
+        for name, values in arrays(runs[0].file(".vtkhdf")).items():
+            assert np.asarray(arrays(run.file(".vtkhdf"))[name]).tobytes() == np.asarray(values).tobytes(), name
 
 
 def script_of(code):
