@@ -15,7 +15,7 @@ module emcon_contact
    implicit none
    private
    public :: strained_only, contact_t, contact_box_t, contact_step_t, gap_state_t
-   public :: max_penetration_on_entry, gap_ratio, push_place, acts_by_end
+   public :: max_penetration_on_entry, gap_ratio, push_place
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
    !> static step among those to come.
@@ -178,13 +178,6 @@ contains
 
       push_place = merge(1.0_wp, 0.5_wp, step%pushes_at_end)
    end function push_place
-
-   !> Do contact forces act by the end of the step alone?
-   pure logical function acts_by_end(step)
-      type(contact_step_t), intent(in) :: step
-
-      acts_by_end = step%pushes_at_end
-   end function acts_by_end
 
    !> A gap by the shorter edge of both sides: how far apart they are as each of them sees it.
    pure real(wp) function gap_ratio(state, gap)
