@@ -5,7 +5,7 @@
 module emcon_edge_contact_space
    use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, slip_place
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_edge_choice_space, only : edge_choice_follow_arcs, edge_choice_init, &
       edge_choice_is_guard, edge_choice_slave, edge_choice_t, edge_choice_update, least_sine
@@ -193,14 +193,14 @@ contains
             end if
          end associate
       end associate
-      if (item%has_friction) call add_slip(at, way, ends, push_place(self%step), item)
+      if (item%has_friction) call add_slip(at, way, ends, slip_place(self%step), item)
    end subroutine evaluate_crossing
 
    !> Slip of a crossing with its derivatives.
    pure subroutine add_slip(at, way, ends, at_part, item)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 4) of the ends [L]
       type(edge_ends_t), intent(in) :: ends
-      real(wp), intent(in) :: at_part            !! of the step, where friction acts
+      real(wp), intent(in) :: at_part            !! of `slip_place`
       type(condition_t), intent(inout) :: item   !! with its nodes
       type(edge_pair_slip_t) :: slip
       integer :: s
@@ -239,7 +239,7 @@ contains
       if (self%choice%stencil(i)%master == 0) return
       call edge_stencil_place(self%choice%edges, self%choice%stencil(i), x, u0, at)
       call edge_stencil_motion(self%choice%edges, self%choice%stencil(i), du, way)
-      call edge_pair_slip(at, way, push_place(self%step), .true., over)
+      call edge_pair_slip(at, way, slip_place(self%step), .true., over)
       slip = over%f
    end function edge_slip
 

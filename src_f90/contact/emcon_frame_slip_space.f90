@@ -1,6 +1,6 @@
 !> Slip of a point over the plane of a frame of two vectors in space over a step: two numbers.
 !>
-!> The changes of its affine coordinates, times the vectors of the frame where friction acts. Each
+!> The changes of its affine coordinates, times the vectors of the frame at a place in the step. Each
 !> has forces without resultant and moment, and rigid turns are no slip. Source: docs/theory.md,
 !> section 14.3.
 module emcon_frame_slip_space
@@ -15,10 +15,10 @@ module emcon_frame_slip_space
    !> A direction that is normal to a plane but for this part of it is no direction in the plane.
    real(wp), parameter :: no_direction = 0.1_wp
 
-   !> What slip is counted along, and where friction acts.
+   !> What slip is counted along, at a place in the step.
    type :: slip_axis_t
       real(wp) :: along(3) = 0.0_wp              !! there, of any length
-      real(wp) :: place = 0.0_wp                 !! of the step: 0 at its start, 1 at its end
+      real(wp) :: place = 0.0_wp                 !! 0: at the start, 1: at the end; between
    end type slip_axis_t
 
    type :: frame_slip_t
@@ -43,9 +43,9 @@ module emcon_frame_slip_space
 
 contains
 
-   !> Slip along two directions in the plane of the frame where friction acts, at right angles: the
-   !> first one is as near to that of `axis` as it can be. Lengths are those of the frame there, too:
-   !> so friction is opposite to slip, however frame and directions turn and stretch in the step.
+   !> Slip along two directions in the plane of the frame where `axis` is, at right angles: the first
+   !> one is as near to that as it can be. Lengths are those of the frame there, too. Friction that
+   !> acts there is opposite to slip, however frame and directions turn and stretch in the step.
    pure subroutine frame_slip(x, dx, axis, leaves_second, slip)
       !> Origin, tips of both vectors, point: where they start, how they move [L]
       real(wp), intent(in) :: x(3, 4), dx(3, 4)
@@ -69,7 +69,7 @@ contains
          call add_frame_first(turn, k, axis%place, vertex%df(:at_eta), slip)
          if (leaves_second) cycle
          slip%h(:, :, k) = by(at_xi, k)*second(:, :, at_xi) + by(at_eta, k)*second(:, :, at_eta)
-         call add_frame_second(turn, k, vertex%g(:, :at_eta), slip)
+         call add_frame_second(turn, k, axis%place, vertex%g(:, :at_eta), slip)
       end do
    end subroutine frame_slip
 
@@ -115,20 +115,23 @@ contains
       end associate
    end subroutine add_frame_first
 
-   !> What it changes the discrete gradient of slip `k` by: where forces are discrete gradients,
-   !> half of it by its end; elsewhere `contact_t` counts all derivatives of forces twice.
-   pure subroutine add_frame_second(turn, k, g, slip)
+   !> What it changes the discrete gradient of slip `k` by: nothing by the end where the frame is that
+   !> of the start. Where it is that of the end, steps end as they start, and half is by each.
+   pure subroutine add_frame_second(turn, k, place, g, slip)
       type(frame_turn_t), intent(in) :: turn
       integer, intent(in) :: k
+      real(wp), intent(in) :: place              !! of `slip_axis_t`
       real(wp), intent(in) :: g(:, :)            !! (n_frame_var, 2) of affine coordinates
       type(frame_slip_t), intent(inout) :: slip
+      real(wp) :: part
       integer :: j, m
 
-      associate (other => merge(0.5_wp, -0.5_wp, k == 1)*slip%g(:, 3 - k))
+      part = min(0.5_wp, place)
+      associate (other => merge(part, -part, k == 1)*slip%g(:, 3 - k))
          do j = 1, 3
             do m = 1, 2
                associate (own => slip%h(:, 3*(m - 1) + j, k))
-                  own = own + (0.5_wp*turn%basis(j, k))*g(:, m) + turn%by_side(j, m)*other
+                  own = own + (part*turn%basis(j, k))*g(:, m) + turn%by_side(j, m)*other
                end associate
             end do
             slip%h_along(:, j, k) = turn%by_along(j)*other

@@ -342,8 +342,10 @@ contains
       if (.not. total > 0.0_wp) return
       side = mortar_slave_side(faces, faces%sides%slave%node, i)
       along = 0.0_wp
-      along(findloc(item%node(:item%n_node), side(1), 1)) = -1.0_wp
-      along(findloc(item%node(:item%n_node), side(2), 1)) = 1.0_wp
+      if (axis%place > 0.0_wp) then
+         along(findloc(item%node(:item%n_node), side(1), 1)) = -1.0_wp
+         along(findloc(item%node(:item%n_node), side(2), 1)) = 1.0_wp
+      end if
       call begin_cells(cells, self, faces, i, item%n_node)
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
@@ -364,9 +366,10 @@ contains
       real(wp), intent(in) :: weight(:, :)       !! (3, n_node)
       real(wp), intent(in) :: along(:)           !! (n_node) the same of what slip is counted along
       type(condition_t), intent(inout) :: item
-      logical :: is_used(size(weight, 2))
+      logical :: is_used(size(weight, 2)), turns
       integer :: j, s
 
+      turns = any(abs(along) > 0.0_wp)
       is_used = any(abs(weight) > 0.0_wp, 1) .or. abs(along) > 0.0_wp
       is_used(1) = .true.
       associate (place => pack([(j, j = 1, size(is_used))], is_used))
@@ -375,11 +378,11 @@ contains
                item%slip(s) = item%slip(s) + slip%f(s)
                call node_sums_first(slip%g(:, s), own, 1.0_wp, place, item%t(:, :, s))
                call node_sums_first(slip%c(:, s), own, 1.0_wp, place, item%t1(:, :, s))
-               call node_sums_first(slip%c_along(:, s), reshape(side, [size(side), 1]), 1.0_wp, &
-                  place, item%t1(:, :, s))
+               if (turns) call node_sums_first(slip%c_along(:, s), reshape(side, [size(side), &
+                  1]), 1.0_wp, place, item%t1(:, :, s))
                if (item%leaves_second) cycle
                call node_sums_second(slip%h(:, :, s), own, 1.0_wp, place, item%ht(:, :, s))
-               call node_sums_across(slip%h_along(:, :, s), own, side, 1.0_wp, place, &
+               if (turns) call node_sums_across(slip%h_along(:, :, s), own, side, 1.0_wp, place, &
                   item%ht(:, :, s))
             end do
          end associate

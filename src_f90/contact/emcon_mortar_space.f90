@@ -7,7 +7,7 @@ module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
    use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : gap_state_t, max_penetration_on_entry, push_place, slip_place
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
@@ -457,7 +457,7 @@ contains
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
          call mortar_slip_add(self%slide, self%faces, wanted(k), slot, sight%slip, &
-            mortar_slip_axis(self%faces, wanted(k), x, u0, du, push_place(self%step)), item(k))
+            mortar_slip_axis(self%faces, wanted(k), x, u0, du, slip_place(self%step)), item(k))
       end do
    end subroutine mortar_evaluate
 
@@ -516,7 +516,7 @@ contains
 
       slip = 0.0_wp
       if (allocated(self%slide)) slip = mortar_slip_of(self%slide, self%faces, i, x, u0, du, &
-         push_place(self%step))
+         slip_place(self%step))
    end function mortar_slip
 
    !> Beside what a mean lets in, the chords of curved surfaces cross by their rises.

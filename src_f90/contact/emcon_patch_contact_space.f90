@@ -7,7 +7,7 @@ module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_t
    use emcon_condition_nodes, only : condition_fold, condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, slip_place
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_split, only : facet_split_init, facet_split_t
@@ -416,7 +416,7 @@ contains
             call patch_spread_list(stencil, gap%vertex, is_used, spread)
             call patch_spread(gap, spread, self%scale(i), [(k, k = 1, n)], item)
             if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
-               is_used(2:)), at, way, push_place(self%step), item)
+               is_used(2:)), at, way, slip_place(self%step), item)
             if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &
                pack(stencil%flip(:stencil%n_node), is_used))
          end associate
@@ -461,7 +461,7 @@ contains
    pure type(frame_slip_t) function slip_over(corner, at, way, at_part, leaves_second) result(slip)
       integer, intent(in) :: corner(3)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
-      real(wp), intent(in) :: at_part            !! of the step, where friction acts
+      real(wp), intent(in) :: at_part            !! of `slip_place`
       logical, intent(in) :: leaves_second
 
       ! The point is where the stencil counts from. Its own frame tells directions, so that these
@@ -477,7 +477,7 @@ contains
       type(patch_stencil_t), intent(in) :: stencil   !! with its shares of slip
       integer, intent(in) :: row(:)              !! nodes of the stencil in the condition, but 1
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
-      real(wp), intent(in) :: at_part            !! of the step, where friction acts
+      real(wp), intent(in) :: at_part            !! of `slip_place`
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
       real(wp) :: weight(size(row), 3), along(size(row), 1)
@@ -493,7 +493,7 @@ contains
          n = 0
          do i = 1, size(row)
             associate (by => stencil%weight(row(i), 2 + corner))
-               if (.not. any(abs([by, stencil%weight(row(i), 1)]) > 0.0_wp)) cycle
+               if (.not. any(abs([by, at_part*stencil%weight(row(i), 1)]) > 0.0_wp)) cycle
                n = n + 1
                place(1 + n) = 1 + i
                weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
@@ -505,12 +505,12 @@ contains
                item%slip(s) = item%slip(s) + share*slip%f(s)
                call node_sums_first(slip%g(:, s), weight(:n, :), share, to, item%t(:, :, s))
                call node_sums_first(slip%c(:, s), weight(:n, :), share, to, item%t1(:, :, s))
-               call node_sums_first(slip%c_along(:, s), along(:n, :), share, to, &
-                  item%t1(:, :, s))
+               if (at_part > 0.0_wp) call node_sums_first(slip%c_along(:, s), along(:n, :), &
+                  share, to, item%t1(:, :, s))
                if (item%leaves_second) cycle
                call node_sums_second(slip%h(:, :, s), weight(:n, :), share, to, item%ht(:, :, s))
-               call node_sums_across(slip%h_along(:, :, s), weight(:n, :), along(:n, 1), share, &
-                  to, item%ht(:, :, s))
+               if (at_part > 0.0_wp) call node_sums_across(slip%h_along(:, :, s), weight(:n, :), &
+                  along(:n, 1), share, to, item%ht(:, :, s))
             end do
          end associate
       end do
@@ -537,7 +537,7 @@ contains
       end if
       do k = 1, size(share)
          if (.not. share(k) > 0.0_wp) cycle
-         over = slip_over(slip_corner(self%stencil(i), k), at, way, push_place(self%step), .true.)
+         over = slip_over(slip_corner(self%stencil(i), k), at, way, slip_place(self%step), .true.)
          slip = slip + share(k)*over%f
       end do
    end function patch_slip

@@ -89,7 +89,7 @@ contains
       dx = matmul(turned(size*draw(3:1:-1)), dx) + size*draw(1) - x
    end subroutine draw_step
 
-   !> With friction in the middle of the step, unless told.
+   !> In the vectors of the middle of the step, unless told.
    pure subroutine find(kind, wall, x, dx, slips, place)
       integer, intent(in) :: kind
       type(wall_t), intent(in) :: wall
