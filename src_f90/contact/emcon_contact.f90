@@ -15,7 +15,7 @@ module emcon_contact
    implicit none
    private
    public :: strained_only, contact_t, contact_box_t, contact_step_t, gap_state_t
-   public :: max_penetration_on_entry, gap_ratio, push_place, acts_by_end
+   public :: max_penetration_on_entry, gap_ratio, push_place, slip_place
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
    !> static step among those to come.
@@ -179,12 +179,14 @@ contains
       push_place = merge(1.0_wp, 0.5_wp, step%pushes_at_end)
    end function push_place
 
-   !> Do contact forces act by the end of the step alone?
-   pure logical function acts_by_end(step)
+   !> Where in the step the vectors of meshes are that slip is measured in: where friction acts, if
+   !> that is its end. Where it acts all over the step those of its start: with others the rates of
+   !> slip at its end, along which velocities jump, would have a moment.
+   pure real(wp) function slip_place(step)
       type(contact_step_t), intent(in) :: step
 
-      acts_by_end = step%pushes_at_end
-   end function acts_by_end
+      slip_place = merge(1.0_wp, 0.0_wp, step%pushes_at_end)
+   end function slip_place
 
    !> A gap by the shorter edge of both sides: how far apart they are as each of them sees it.
    pure real(wp) function gap_ratio(state, gap)

@@ -5,7 +5,7 @@
 module emcon_edge_contact_space
    use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : acts_by_end, contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, slip_place
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_edge_choice_space, only : edge_choice_follow_arcs, edge_choice_init, &
       edge_choice_is_guard, edge_choice_slave, edge_choice_t, edge_choice_update, least_sine
@@ -193,19 +193,19 @@ contains
             end if
          end associate
       end associate
-      if (item%has_friction) call add_slip(at, way, ends, acts_by_end(self%step), item)
+      if (item%has_friction) call add_slip(at, way, ends, slip_place(self%step), item)
    end subroutine evaluate_crossing
 
    !> Slip of a crossing with its derivatives.
-   pure subroutine add_slip(at, way, ends, at_end, item)
+   pure subroutine add_slip(at, way, ends, at_part, item)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 4) of the ends [L]
       type(edge_ends_t), intent(in) :: ends
-      logical, intent(in) :: at_end              !! friction acts by the end of the step alone
+      real(wp), intent(in) :: at_part            !! of `slip_place`
       type(condition_t), intent(inout) :: item   !! with its nodes
       type(edge_pair_slip_t) :: slip
       integer :: s
 
-      call edge_pair_slip(at, way, item%leaves_second, at_end, slip)
+      call edge_pair_slip(at, way, at_part, item%leaves_second, slip)
       call condition_resize_slip(item)
       item%slip(:size(slip%f)) = slip%f
       associate (n => ends%n)
@@ -239,7 +239,7 @@ contains
       if (self%choice%stencil(i)%master == 0) return
       call edge_stencil_place(self%choice%edges, self%choice%stencil(i), x, u0, at)
       call edge_stencil_motion(self%choice%edges, self%choice%stencil(i), du, way)
-      call edge_pair_slip(at, way, .true., .false., over)
+      call edge_pair_slip(at, way, slip_place(self%step), .true., over)
       slip = over%f
    end function edge_slip
 

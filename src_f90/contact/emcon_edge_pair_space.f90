@@ -4,7 +4,7 @@
 !> places of the crossing are the affine coordinates; slip is how these change. Source:
 !> docs/theory.md, section 14, eq. (51), and section 14.3.
 module emcon_edge_pair_space
-   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t, slip_axis_t
    use emcon_frame_vertex_space, only : at_eta, at_height, at_xi, frame_of, frame_place, &
       frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
@@ -87,21 +87,22 @@ contains
       if (.not. leaves_second) call second_to_nodes(side, second(:, :, at_height), gap%h)
    end subroutine edge_pair_gap
 
-   !> Slip over a step along two directions in the plane of both edges, the first one along that of
-   !> the slave as the step begins: the master goes by as much the other way.
-   pure subroutine edge_pair_slip(at, way, leaves_second, ends_at_start, slip)
+   !> Slip over a step along two directions in the plane of both edges where friction acts, the
+   !> first one along that of the slave: the master goes by as much the other way.
+   pure subroutine edge_pair_slip(at, way, place, leaves_second, slip)
       real(wp), intent(in) :: at(n_dim, n_edge_pair_node)    !! where the ends start [L]
       real(wp), intent(in) :: way(n_dim, n_edge_pair_node)   !! how they move [L]
+      real(wp), intent(in) :: place              !! where it acts: of `slip_axis_t`
       logical, intent(in) :: leaves_second       !! no second derivatives
-      logical, intent(in) :: ends_at_start       !! nothing moves: start and end are one place
       type(edge_pair_slip_t), intent(out) :: slip
       type(frame_slip_t) :: over
       integer :: k
 
-      call frame_slip(tips_of(at), tips_of(way), at(:, 2) - at(:, 1), leaves_second, &
-         ends_at_start, over)
+      call frame_slip(tips_of(at), tips_of(way), slip_axis_t((at(:, 2) - at(:, 1)) &
+         + place*(way(:, 2) - way(:, 1)), place), leaves_second, over)
       ! The slave's edge is the first vector of the frame.
-      over%h(:, :3, :) = over%h(:, :3, :) + over%by_along
+      over%c(:3, :) = over%c(:3, :) + over%c_along
+      over%h(:, :3, :) = over%h(:, :3, :) + over%h_along
       slip%f = -over%f
       do k = 1, size(over%f)
          call first_to_nodes(-1.0_wp, over%g(:, k), slip%g(:, :, k))

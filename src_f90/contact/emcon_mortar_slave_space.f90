@@ -5,12 +5,10 @@ module emcon_mortar_slave_space
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t, group_angle
    use emcon_facet_split, only : facet_split_init, facet_split_t
    use emcon_facets, only : facets_t
-   use emcon_frame_slip_space, only : tangent_basis
    use emcon_kinds, only : wp
-   use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: mortar_slave_t, mortar_slave_init, mortar_slave_weight, mortar_slave_direction
+   public :: mortar_slave_t, mortar_slave_init, mortar_slave_weight, mortar_slave_side
 
    type :: mortar_slave_t
       type(facet_split_t) :: split
@@ -22,8 +20,6 @@ module emcon_mortar_slave_space
       integer, allocatable :: vertex(:)               !! the same: which vertex of its facet it is
       integer, allocatable :: owner(:, :)             !! (vertex, facet) its constraint; 0: none,
       integer, allocatable :: entry(:, :)             !! and where that has the facet's triangles
-      !> (2, n) a direction along the surface at each, in the sides of its first facet at its vertex
-      real(wp), allocatable :: along(:, :)
    end type mortar_slave_t
 
 contains
@@ -38,7 +34,6 @@ contains
       call facet_weights_init(self%weights, facets, self%split, x)
       call list_vertices(self, facets, x)
       call list_owners(self)
-      call find_directions(self, facets%node, x)
    end subroutine mortar_slave_init
 
    !> One for each smooth group of slave facets at a vertex.
@@ -88,64 +83,18 @@ contains
       end do
    end subroutine list_owners
 
-   !> A direction at each vertex: the first axis in the reference, as near as it can be along the
-   !> surface; where that is normal, another one.
-   pure subroutine find_directions(self, own, x)
-      class(mortar_slave_t), intent(inout) :: self
-      integer, intent(in) :: own(:)              !! nodes of the slave
-      real(wp), intent(in) :: x(:, :)            !! (3, n_node) reference positions [L]
-      real(wp) :: side(3, 2), basis(3, 2), square(2, 2), part(2)
-      integer :: i
-
-      allocate(self%along(2, size(self%node)), source=0.0_wp)
-      do i = 1, size(self%node)
-         call find_sides(self, own, i, x, 0.0_wp*x, side)
-         associate (normal => cross_product(side(:, 1), side(:, 2)))
-            if (.not. norm2(normal) > 0.0_wp) cycle
-            basis = tangent_basis(normal, [1.0_wp, 0.0_wp, 0.0_wp])
-         end associate
-         square = matmul(transpose(side), side)
-         part = matmul(basis(:, 1), side)
-         self%along(:, i) = [square(2, 2)*part(1) - square(1, 2)*part(2), &
-            square(1, 1)*part(2) - square(1, 2)*part(1)]/(square(1, 1)*square(2, 2) &
-            - square(1, 2)**2)
-      end do
-   end subroutine find_directions
-
-   !> Both sides of the first facet of constraint `i` at its vertex.
-   pure subroutine find_sides(self, own, i, x, u, side)
-      class(mortar_slave_t), intent(in) :: self
-      integer, intent(in) :: own(:)              !! nodes of the slave
-      integer, intent(in) :: i
-      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp), intent(out) :: side(3, 2)        !! to the next vertex and to the one before [L]
-      integer :: j, to(2)
-
-      associate (f => self%split%facet(self%triangle(self%start(i))), &
-            m => self%vertex(self%start(i)))
-         associate (n => self%weights%n(f))
-            to = own(self%weights%node([1 + mod(m, n), 1 + mod(m + n - 2, n)], f))
-            associate (from => own(self%weights%node(m, f)))
-               do j = 1, 2
-                  side(:, j) = (x(:, to(j)) - x(:, from)) + (u(:, to(j)) - u(:, from))
-               end do
-            end associate
-         end associate
-      end associate
-   end subroutine find_sides
-
-   !> The direction along the surface at constraint `i` at x + u, of any length: it turns with that.
-   pure function mortar_slave_direction(self, own, i, x, u) result(along)
+   !> The nodes of a side of the slave at constraint `i`: of its first facet its vertex and the next.
+   pure function mortar_slave_side(self, own, i) result(side)
       class(mortar_slave_t), intent(in) :: self
       integer, intent(in) :: own(:)              !! nodes of the slave
       integer, intent(in) :: i                   !! 1..n
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp) :: along(3)
-      real(wp) :: side(3, 2)
+      integer :: side(2)
 
-      call find_sides(self, own, i, x, u, side)
-      along = matmul(side, self%along(:, i))
-   end function mortar_slave_direction
+      associate (f => self%split%facet(self%triangle(self%start(i))), &
+            m => self%vertex(self%start(i)))
+         side = own(self%weights%node([m, 1 + mod(m, self%weights%n(f))], f))
+      end associate
+   end function mortar_slave_side
 
    !> The multiplier of place `k` of `triangle` at the corners of that: the dual one if theta is 1,
    !> the linear one if it is 0.

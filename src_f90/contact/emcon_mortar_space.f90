@@ -7,7 +7,7 @@ module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
    use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : acts_by_end, gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : gap_state_t, max_penetration_on_entry, push_place, slip_place
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
@@ -19,9 +19,9 @@ module emcon_mortar_space
    use emcon_mortar_means_space, only : mortar_means_init, mortar_means_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
-   use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
-   use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
-      mortar_slip_shift, mortar_slip_sight, mortar_slip_t, slip_axis_t
+   use emcon_mortar_slave_space, only : mortar_slave_weight
+   use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_axis, mortar_slip_choose, &
+      mortar_slip_of, mortar_slip_shift, mortar_slip_sight, mortar_slip_t
    use emcon_mortar_sum_space, only : mortar_add_facet, mortar_begin_sum, mortar_facet_sums, &
       mortar_sight, sight_t
    use emcon_patch_gap_space, only : patch_sums_t
@@ -51,8 +51,6 @@ module emcon_mortar_space
       logical :: knows_start = .false.                !! from where stencils were chosen
       type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
       type(mortar_slip_t), allocatable :: next_slide(:)    !! of the last motion that was looked at
-      real(wp), allocatable :: along(:, :)            !! (3, n_constraint) that slips are counted
-                                                      !! along, as the step begins
       !> (3, nodes that are looked at) the motions that both are of [L]
       real(wp), allocatable :: slide_du(:, :), next_du(:, :)
       !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
@@ -90,7 +88,6 @@ contains
       if (.not. contact_laws_rub(self%laws)) return
       allocate(self%slide(size(self%faces%split%facet)))
       allocate(self%next_slide(size(self%faces%split%facet)))
-      allocate(self%along(3, self%n_constraint), source=0.0_wp)
    end subroutine mortar_space_init
 
    !> Room for what a step knows, and sizes in the reference.
@@ -171,7 +168,6 @@ contains
          call choose_slips_again(self, x, u0)
       end if
       do i = 1, self%n_constraint
-         self%along(:, i) = direction_of(self, i, x, u0)
          self%state(i)%slip_shift = mortar_slip_shift(self%next_slide, self%slide, self%faces, i)
       end do
    end subroutine mortar_begin_step
@@ -461,30 +457,9 @@ contains
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
          call mortar_slip_add(self%slide, self%faces, wanted(k), slot, sight%slip, &
-            axis_of(self, wanted(k), x, u0), item(k))
+            mortar_slip_axis(self%faces, wanted(k), x, u0, du, slip_place(self%step)), item(k))
       end do
    end subroutine mortar_evaluate
-
-   !> The direction that slip of constraint `i` is counted along. As friction acts by the end of the
-   !> step, conditions are evaluated there: then it is that of where the step began.
-   pure type(slip_axis_t) function axis_of(self, i, x, u0) result(axis)
-      type(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
-
-      axis%is_at_end = acts_by_end(self%step)
-      if (axis%is_at_end) axis%along = self%along(:, i)
-      if (.not. axis%is_at_end) axis%along = direction_of(self, i, x, u0)
-   end function axis_of
-
-   pure function direction_of(self, i, x, u) result(along)
-      type(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp) :: along(3)
-
-      along = mortar_slave_direction(self%faces, self%faces%sides%slave%node, i, x, u)
-   end function direction_of
 
    !> Add a facet to the conditions of its vertices.
    pure subroutine add_facet(self, f, sight, place, target, item)
@@ -540,7 +515,8 @@ contains
       real(wp) :: slip(size(x, 1) - 1)           !! [L]
 
       slip = 0.0_wp
-      if (allocated(self%slide)) slip = mortar_slip_of(self%slide, self%faces, i, x, u0, du)
+      if (allocated(self%slide)) slip = mortar_slip_of(self%slide, self%faces, i, x, u0, du, &
+         slip_place(self%step))
    end function mortar_slip
 
    !> Beside what a mean lets in, the chords of curved surfaces cross by their rises.

@@ -3,6 +3,7 @@
 !> kept over the step. Source: docs/theory.md, section 14.3.
 module emcon_mortar_wall_slip_space
    use emcon_constraint, only : condition_t, most_slips
+   use emcon_frame_slip_space, only : slip_axis_t
    use emcon_frame_vertex_space, only : frame_size
    use emcon_kinds, only : wp
    use emcon_mortar_wall_faces_space, only : wall_faces_corners, wall_faces_t, wall_faces_weight
@@ -11,11 +12,18 @@ module emcon_mortar_wall_slip_space
    use emcon_wall_slip_space, only : n_wall_point, wall_axis, wall_slip, wall_slip_t
    implicit none
    private
-   public :: mortar_wall_slip_areas, mortar_wall_slip_of, mortar_wall_slip_add
+   public :: wall_slides_t, mortar_wall_slip_choose, mortar_wall_slip_of, mortar_wall_slip_add
 
    integer, parameter :: n_dim = 3
    !> What the slip of a triangle depends on: its corners, then the origin and tips of the wall.
    integer, parameter :: n_sum = n_corner + n_wall_point - 1, n_var = n_dim*n_sum
+
+   type :: wall_slides_t
+      real(wp) :: place = 0.0_wp                 !! where friction acts, of `slip_axis_t`
+      !> (n_triangle) twice the areas of those that face the wall, between those at the start and at
+      !> the end of a motion; 0 for others [L^2]
+      real(wp), allocatable :: area(:)
+   end type wall_slides_t
 
    !> The part of a triangle in the slip of a condition, as `wall_slip_t` has it.
    type :: part_t
@@ -26,24 +34,23 @@ module emcon_mortar_wall_slip_space
 
 contains
 
-   !> Twice the areas of the triangles that face the wall, between those at the start and at the
-   !> end of a motion; 0 for others.
-   pure function mortar_wall_slip_areas(faces, x, u0, du, place) result(area)
+   !> What slip over a motion is made of.
+   pure type(wall_slides_t) function mortar_wall_slip_choose(faces, x, u0, du, place) result(self)
       type(wall_faces_t), intent(in) :: faces    !! with what of them faces the wall
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      real(wp), intent(in) :: place              !! 0: at its start, 1: at its end; between
-      real(wp) :: area(size(faces%is_facing))    !! [L^2]
+      real(wp), intent(in) :: place              !! of `wall_slides_t`
       real(wp) :: corner(n_dim, n_corner)
       integer :: t
 
-      area = 0.0_wp
-      do t = 1, size(area)
+      self%place = place
+      allocate(self%area(size(faces%is_facing)), source=0.0_wp)
+      do t = 1, size(self%area)
          if (.not. faces%is_facing(t)) cycle
          corner = wall_faces_corners(faces, t, x) + wall_faces_corners(faces, t, u0)
-         area(t) = (1.0_wp - place)*frame_size(corner) + place*frame_size(corner &
+         self%area(t) = (1.0_wp - place)*frame_size(corner) + place*frame_size(corner &
             + wall_faces_corners(faces, t, du))
       end do
-   end function mortar_wall_slip_areas
+   end function mortar_wall_slip_choose
 
    !> The weight of each point of place `k` of the triangles of vertices [L^2].
    pure function moments_of(faces, area, k) result(moment)
@@ -83,11 +90,11 @@ contains
    end subroutine gather
 
    !> Weights times slips of the points of a triangle.
-   pure subroutine find_part(faces, moment, at, way, along, leaves_second, part)
+   pure subroutine find_part(faces, moment, at, way, axis, leaves_second, part)
       type(wall_faces_t), intent(in) :: faces
       real(wp), intent(in) :: moment(:)          !! (n_point) of `moments_of`, by the total
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, n_sum) of `gather` [L]
-      real(wp), intent(in) :: along(:)           !! of `wall_axis`
+      type(slip_axis_t), intent(in) :: axis
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(part_t), intent(out) :: part
       real(wp) :: share(n_wall_point, n_sum)     !! of corners and the wall in a point and it
@@ -97,7 +104,7 @@ contains
       do q = 1, n_point
          share = shares_of(q)
          call wall_slip(faces%wall, matmul(at, transpose(share)), matmul(way, transpose(share)), &
-            along, leaves_second, slip)
+            axis, leaves_second, slip)
          part%f = part%f + moment(q)*slip%f
          do s = 1, most_slips
             part%g(:, :, s) = part%g(:, :, s) + moment(q)*matmul(slip%g(:, :, s), share)
@@ -142,9 +149,9 @@ contains
    end subroutine add_second
 
    !> The slip of constraint `i` [L].
-   pure function mortar_wall_slip_of(faces, area, i, x, u0, du) result(slip)
+   pure function mortar_wall_slip_of(self, faces, i, x, u0, du) result(slip)
+      type(wall_slides_t), intent(in) :: self
       type(wall_faces_t), intent(in) :: faces
-      real(wp), intent(in) :: area(:)            !! (n_triangle) of `mortar_wall_slip_areas` [L^2]
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp) :: slip(most_slips)
@@ -153,14 +160,14 @@ contains
       integer :: k
 
       slip = 0.0_wp
-      total = total_of(faces, area, i)
+      total = total_of(faces, self%area, i)
       if (.not. total > 0.0_wp) return
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
-            if (.not. area(t) > 0.0_wp) cycle
+            if (.not. self%area(t) > 0.0_wp) cycle
             call gather(faces, t, x, u0, du, at, way)
-            call find_part(faces, moments_of(faces, area, k)/total, at, way, &
-               wall_axis(faces%axis(i)), .true., part)
+            call find_part(faces, moments_of(faces, self%area, k)/total, at, way, &
+               slip_axis_t(wall_axis(faces%axis(i)), self%place), .true., part)
             slip = slip + part%f
          end associate
       end do
@@ -168,9 +175,9 @@ contains
 
    !> Add the slip of constraint `i` and its derivatives to its condition, which has all nodes of
    !> it and of the wall, and room for slip.
-   pure subroutine mortar_wall_slip_add(faces, area, i, x, u0, du, item)
+   pure subroutine mortar_wall_slip_add(self, faces, i, x, u0, du, item)
+      type(wall_slides_t), intent(in) :: self
       type(wall_faces_t), intent(in) :: faces
-      real(wp), intent(in) :: area(:)            !! (n_triangle) of `mortar_wall_slip_areas` [L^2]
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       type(condition_t), intent(inout) :: item
@@ -178,14 +185,14 @@ contains
       type(part_t) :: part
       integer :: k
 
-      total = total_of(faces, area, i)
+      total = total_of(faces, self%area, i)
       if (.not. total > 0.0_wp) return
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
-            if (.not. area(t) > 0.0_wp) cycle
+            if (.not. self%area(t) > 0.0_wp) cycle
             call gather(faces, t, x, u0, du, at, way)
-            call find_part(faces, moments_of(faces, area, k)/total, at, way, &
-               wall_axis(faces%axis(i)), item%leaves_second, part)
+            call find_part(faces, moments_of(faces, self%area, k)/total, at, way, &
+               slip_axis_t(wall_axis(faces%axis(i)), self%place), item%leaves_second, part)
             call spread_part(faces, t, part, item)
          end associate
       end do

@@ -19,8 +19,8 @@ module emcon_mortar_wall_space
       wall_faces_init, wall_faces_sum, wall_faces_t, wall_faces_weight
    use emcon_mortar_wall_gap_space, only : n_corner, n_part_point, n_point, point, &
       wall_triangle_heights, wall_triangle_look, wall_triangle_rise, wall_triangle_t
-   use emcon_mortar_wall_slip_space, only : mortar_wall_slip_add, mortar_wall_slip_areas, &
-      mortar_wall_slip_of
+   use emcon_mortar_wall_slip_space, only : mortar_wall_slip_add, mortar_wall_slip_choose, &
+      mortar_wall_slip_of, wall_slides_t
    use emcon_scene, only : scene_t
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
@@ -41,8 +41,8 @@ module emcon_mortar_wall_space
       !> (corner, 0:1, n_triangle) integrals with the weights that are 1 at one corner
       real(wp), allocatable :: height(:, :, :), area_of(:, :, :)
       real(wp), allocatable :: size(:)                !! (n_constraint) mean facet there [L]
-      !> (n_triangle) twice the areas that slip is weighed with in the step; with friction [L^2]
-      real(wp), allocatable :: slide_area(:)
+      !> What slip is made of in the step; with friction
+      type(wall_slides_t), allocatable :: slide
       real(wp) :: depth = 0.0_wp                      !! that pads and laws reach [L]
    contains
       procedure :: configure => mortar_wall_configure
@@ -76,8 +76,10 @@ contains
       self%max_penetration_at_start = merge(huge(1.0_wp), deepest_start, &
          wall_is_solid(self%faces%wall))
       call contact_laws_of_surface(pair%interaction, self%laws)
-      if (contact_laws_rub(self%laws)) allocate(self%slide_area(size(self%faces%is_facing)), &
-         source=0.0_wp)
+      if (contact_laws_rub(self%laws)) then
+         allocate(self%slide)
+         allocate(self%slide%area(size(self%faces%is_facing)), source=0.0_wp)
+      end if
    end subroutine mortar_wall_init
 
    !> Room for what a step knows, and sizes in the reference.
@@ -179,8 +181,8 @@ contains
       call self%has_looked(0.0_wp)
       call wall_faces_choose(self%faces, x, u0)
       if (allocated(self%bulges)) call find_sagittas(self, x, u0)
-      if (allocated(self%slide_area)) self%slide_area = mortar_wall_slip_areas(self%faces, x, u0, &
-         du, push_place(self%step))
+      if (allocated(self%slide)) self%slide = mortar_wall_slip_choose(self%faces, x, u0, du, &
+         push_place(self%step))
    end subroutine mortar_wall_begin_step
 
    !> Mean gaps at both ends of the step.
@@ -278,7 +280,7 @@ contains
          item(k)%size = self%size(wanted(k))
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
-         call mortar_wall_slip_add(self%faces, self%slide_area, wanted(k), x, u0, du, item(k))
+         call mortar_wall_slip_add(self%slide, self%faces, wanted(k), x, u0, du, item(k))
       end do
    end subroutine mortar_wall_evaluate
 
@@ -290,8 +292,8 @@ contains
       real(wp) :: slip(size(x, 1) - 1)           !! [L]
 
       slip = 0.0_wp
-      if (allocated(self%slide_area)) slip = mortar_wall_slip_of(self%faces, self%slide_area, i, &
-         x, u0, du)
+      if (allocated(self%slide)) slip = mortar_wall_slip_of(self%slide, self%faces, i, x, u0, &
+         du)
    end function mortar_wall_slip
 
    pure real(wp) function mortar_wall_mean_size(self, x) result(length)

@@ -7,13 +7,13 @@ module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_t
    use emcon_condition_nodes, only : condition_fold, condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : acts_by_end, contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, slip_place
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_split, only : facet_split_init, facet_split_t
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
-   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t, slip_axis_t
    use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       interaction_reach, pair_has_order
@@ -429,7 +429,7 @@ contains
             call patch_spread_list(stencil, gap%vertex, is_used, spread)
             call patch_spread(gap, spread, self%scale(i), [(k, k = 1, n)], item)
             if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
-               is_used(2:)), at, way, acts_by_end(self%step), item)
+               is_used(2:)), at, way, slip_place(self%step), item)
             if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &
                pack(stencil%flip(:stencil%n_node), is_used))
          end associate
@@ -471,28 +471,29 @@ contains
    end function slip_corner
 
    !> Slip over a triangle.
-   pure type(frame_slip_t) function slip_over(corner, at, way, leaves_second, at_end) result(slip)
+   pure type(frame_slip_t) function slip_over(corner, at, way, at_part, leaves_second) result(slip)
       integer, intent(in) :: corner(3)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
+      real(wp), intent(in) :: at_part            !! of `slip_place`
       logical, intent(in) :: leaves_second
-      logical, intent(in) :: at_end              !! friction acts by the end of the step alone
 
       ! The point is where the stencil counts from. Its own frame tells directions, so that these
       ! turn with it, and not from triangle to triangle.
       associate (place => [3 + corner, 1])
-         call frame_slip(at(:, place), way(:, place), at(:, 2), leaves_second, at_end, slip)
+         call frame_slip(at(:, place), way(:, place), slip_axis_t(at(:, 2) + at_part*way(:, 2), &
+            at_part), leaves_second, slip)
       end associate
    end function slip_over
 
    !> Slip with its derivatives.
-   pure subroutine add_slip(stencil, row, at, way, at_end, item)
+   pure subroutine add_slip(stencil, row, at, way, at_part, item)
       type(patch_stencil_t), intent(in) :: stencil   !! with its shares of slip
       integer, intent(in) :: row(:)              !! nodes of the stencil in the condition, but 1
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
-      logical, intent(in) :: at_end              !! friction acts by the end of the step alone
+      real(wp), intent(in) :: at_part            !! of `slip_place`
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
-      real(wp) :: weight(size(row), 3), along(size(row))
+      real(wp) :: weight(size(row), 3), along(size(row), 1)
       integer :: place(1 + size(row)), corner(3), i, k, n, s
 
       call condition_resize_slip(item)
@@ -500,17 +501,16 @@ contains
       do k = 1, size(stencil%patch%slip_share)
          if (.not. stencil%patch%slip_share(k) > 0.0_wp) cycle
          corner = slip_corner(stencil, k)
-         slip = slip_over(corner, at, way, item%leaves_second, at_end)
+         slip = slip_over(corner, at, way, at_part, item%leaves_second)
          ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
          n = 0
          do i = 1, size(row)
             associate (by => stencil%weight(row(i), 2 + corner))
-               if (.not. any(abs([by, merge(stencil%weight(row(i), 1), 0.0_wp, at_end)]) &
-                  > 0.0_wp)) cycle
+               if (.not. any(abs([by, at_part*stencil%weight(row(i), 1)]) > 0.0_wp)) cycle
                n = n + 1
                place(1 + n) = 1 + i
                weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
-               along(n) = stencil%weight(row(i), 1)
+               along(n, 1) = stencil%weight(row(i), 1)
             end associate
          end do
          associate (share => stencil%patch%slip_share(k), to => place(:1 + n))
@@ -518,10 +518,12 @@ contains
                item%slip(s) = item%slip(s) + share*slip%f(s)
                call node_sums_first(slip%g(:, s), weight(:n, :), share, to, item%t(:, :, s))
                call node_sums_first(slip%c(:, s), weight(:n, :), share, to, item%t1(:, :, s))
+               if (at_part > 0.0_wp) call node_sums_first(slip%c_along(:, s), along(:n, :), &
+                  share, to, item%t1(:, :, s))
                if (item%leaves_second) cycle
                call node_sums_second(slip%h(:, :, s), weight(:n, :), share, to, item%ht(:, :, s))
-               if (at_end) call node_sums_across(slip%by_along(:, :, s), weight(:n, :), &
-                  along(:n), share, to, item%ht(:, :, s))
+               if (at_part > 0.0_wp) call node_sums_across(slip%h_along(:, :, s), weight(:n, :), &
+                  along(:n, 1), share, to, item%ht(:, :, s))
             end do
          end associate
       end do
@@ -548,7 +550,7 @@ contains
       end if
       do k = 1, size(share)
          if (.not. share(k) > 0.0_wp) cycle
-         over = slip_over(slip_corner(self%stencil(i), k), at, way, .true., .false.)
+         over = slip_over(slip_corner(self%stencil(i), k), at, way, slip_place(self%step), .true.)
          slip = slip + share(k)*over%f
       end do
    end function patch_slip

@@ -4,7 +4,7 @@
 module emcon_wall_contact_space
    use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_element_kind, only : max_face_nodes
@@ -13,6 +13,7 @@ module emcon_wall_contact_space
    use emcon_facet_split, only : facet_split_centre, facet_split_middles
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_length, facets_normal, facets_t
+   use emcon_frame_slip_space, only : slip_axis_t
    use emcon_guards, only : corner_slack
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
@@ -328,9 +329,17 @@ contains
       type(wall_slip_t) :: over
 
       call gather(self, i, x, u0, du, at, way)
-      call wall_slip(self%wall, at, way, wall_axis(self%along(i)), .true., over)
+      call wall_slip(self%wall, at, way, axis_of(self, i), .true., over)
       slip = over%f
    end function wall_slip_over
+
+   !> What its slip is counted along.
+   pure type(slip_axis_t) function axis_of(self, i) result(axis)
+      type(wall_contact_t), intent(in) :: self
+      integer, intent(in) :: i
+
+      axis = slip_axis_t(wall_axis(self%along(i)), push_place(self%step))
+   end function axis_of
 
    !> Derivatives by the nodes of point `i` and of the wall, from those by the point and the wall.
    pure subroutine spread_gap(self, i, gap, n_of_gap, n, item)
@@ -375,7 +384,7 @@ contains
       real(wp) :: weight(max_face_nodes)
       integer :: k, m, n, s, node(max_face_nodes)
 
-      call wall_slip(self%wall, at, way, wall_axis(self%along(i)), item%leaves_second, slip)
+      call wall_slip(self%wall, at, way, axis_of(self, i), item%leaves_second, slip)
       call find_parts(self, i, m, node, weight)
       call condition_resize_slip(item)
       n = item%n_node

@@ -1,10 +1,10 @@
 !> Slip of a point along a wall in space over a step: two numbers.
 !>
 !> The point in the vectors of the wall is three dot products; their changes along two directions
-!> that touch the wall half way are slip. So rigid turns of wall and point together are none, and
-!> its forces have no resultant and no moment. Source: docs/theory.md, section 14.3.
+!> that touch the wall where friction acts are slip. So rigid turns of wall and point together are
+!> none, and its forces have no resultant and no moment. Source: docs/theory.md, section 14.3.
 module emcon_wall_slip_space
-   use emcon_frame_slip_space, only : tangent_axis, tangent_basis
+   use emcon_frame_slip_space, only : slip_axis_t, tangent_axis, tangent_basis
    use emcon_kinds, only : wp
    use emcon_wall, only : wall_t
    use emcon_wall_distance_space, only : wall_bend, wall_find, wall_spot_t
@@ -35,12 +35,13 @@ module emcon_wall_slip_space
 
 contains
 
-   !> The first direction is as near to `along` as it can be.
-   pure subroutine wall_slip(wall, x, dx, along, leaves_second, slip)
+   !> The first direction is as near to that of `axis` as it can be, which is by the vectors of the
+   !> wall.
+   pure subroutine wall_slip(wall, x, dx, axis, leaves_second, slip)
       type(wall_t), intent(in) :: wall
       !> Point, origin, tips: where they start, how they move [L]
       real(wp), intent(in) :: x(n_dim, n_wall_point), dx(n_dim, n_wall_point)
-      real(wp), intent(in) :: along(n_dim)       !! in the vectors of the wall, of any length
+      type(slip_axis_t), intent(in) :: axis
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(wall_slip_t), intent(out) :: slip
       type(places_t) :: place
@@ -48,13 +49,13 @@ contains
       integer :: i, k
 
       place = places_of(wall, x, dx)
-      call find_basis(wall, place%start + 0.5_wp*place%change, along, basis, by_place)
+      call find_basis(wall, place%start + axis%place*place%change, axis%along, basis, by_place)
       do k = 1, 2
          slip%f(k) = dot_product(basis(:, k), place%change)
          slip%g(:, :, k) = sum_of(basis(:, k), place%mean_way, place%mean_vector)
          ! The directions turn with the place at the end.
          do i = 1, n_dim
-            weight(i) = basis(i, k) + dot_product(place%change, by_place(:, i, k))
+            weight(i) = basis(i, k) + axis%place*dot_product(place%change, by_place(:, i, k))
          end do
          slip%c(:, :, k) = sum_of(weight, place%end_way, place%end_vector)
       end do
@@ -99,7 +100,8 @@ contains
       by(:, 2) = -(by(:, 1) + sum(weight)*way)
    end function sum_of
 
-   !> Of dot products, and of directions that turn with the place at the end.
+   !> Of dot products, and of directions that turn with the place: half of that is by the end, as in
+   !> `frame_slip`.
    pure subroutine add_second(wall, place, basis, by_place, slip)
       type(wall_t), intent(in) :: wall
       type(places_t), intent(in) :: place
@@ -127,7 +129,7 @@ contains
             end do
             if (.not. any(abs(by_place(i, :, k)) > 0.0_wp)) cycle
             part = sum_of(wall_axis(i), place%mean_way, place%mean_vector)
-            turn = sum_of(by_place(i, :, k), place%end_way, place%end_vector)
+            turn = sum_of(0.5_wp*by_place(i, :, k), place%end_way, place%end_vector)
             do j = 1, n_wall_point
                do b = 1, n_dim
                   do a = 1, n_wall_point
@@ -185,29 +187,28 @@ contains
       end do
    end function own_vectors
 
-   !> Directions that touch the wall half way, in its vectors, and how they turn with the place at
-   !> the end.
-   pure subroutine find_basis(wall, half_way, along, basis, by_place)
+   !> Directions that touch the wall at a point, in its vectors, and how they turn with that.
+   pure subroutine find_basis(wall, point, along, basis, by_place)
       type(wall_t), intent(in) :: wall
-      real(wp), intent(in) :: half_way(n_dim)    !! in the vectors of the wall [L]
+      real(wp), intent(in) :: point(n_dim)       !! in the vectors of the wall [L]
       real(wp), intent(in) :: along(n_dim)
       real(wp), intent(out) :: basis(n_dim, 2)
       real(wp), intent(out) :: by_place(n_dim, n_dim, 2)   !! (of, by coordinate, which) [1/L]
       real(wp) :: axis(n_dim), bend(n_dim, n_dim), lean
-      type(wall_spot_t) :: middle
+      type(wall_spot_t) :: spot
       integer :: i
 
-      middle = wall_find(wall, own_vectors(wall), half_way)
-      axis = tangent_axis(middle%normal, along)
-      basis = tangent_basis(middle%normal, axis)
-      bend = 0.5_wp*wall_bend(wall, own_vectors(wall), half_way)
+      spot = wall_find(wall, own_vectors(wall), point)
+      axis = tangent_axis(spot%normal, along)
+      basis = tangent_basis(spot%normal, axis)
+      bend = wall_bend(wall, own_vectors(wall), point)
       by_place = 0.0_wp
       if (.not. any(abs(bend) > 0.0_wp)) return  ! its normal does not turn
-      lean = dot_product(middle%normal, axis)/norm2(matmul(axis, basis))
+      lean = dot_product(spot%normal, axis)/norm2(matmul(axis, basis))
       associate (turn => matmul(transpose(basis), bend))
          do i = 1, n_dim
-            by_place(:, i, 1) = -turn(1, i)*middle%normal - lean*turn(2, i)*basis(:, 2)
-            by_place(:, i, 2) = -turn(2, i)*middle%normal + lean*turn(2, i)*basis(:, 1)
+            by_place(:, i, 1) = -turn(1, i)*spot%normal - lean*turn(2, i)*basis(:, 2)
+            by_place(:, i, 2) = -turn(2, i)*spot%normal + lean*turn(2, i)*basis(:, 1)
          end do
       end associate
    end subroutine find_basis

@@ -351,8 +351,8 @@ contains
          text = "the solutions of the increment touch other faces than those assumed for them"
          remedy = "let the smaller surface be the slave, or take another TYPE of *CONTACT PAIR"
          if (is_wall) then
-            text = "each solution of the increment meets another part of the wall than it was " &
-               // "found for"
+            text = "the solutions of the increment touch other parts of the wall than those " &
+               // "assumed for them"
             remedy = "round the corners of the wall, give the body smaller faces there, or take " &
                // "another TYPE of *CONTACT PAIR"
          end if

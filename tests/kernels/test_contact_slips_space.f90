@@ -153,7 +153,8 @@ contains
       end do
    end subroutine test_slide
 
-   !> Central differences err by the square of their way, beside round-off by it.
+   !> Central differences err by the square of their way, beside round-off by it. Where friction acts
+   !> at the end of the step, slip is measured there; `test_at_end` has its forces.
    subroutine test_derivatives(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -166,9 +167,10 @@ contains
       step = eps**(1.0_wp/3.0_wp)
       bound = 1.0e3_wp*step**2
       n_seen = 0
-      do k = 1, 12
+      do k = 1, 24
          call draw(k, 0.1_wp, scene, du, contact, error)
          if (allocated(error)) return
+         contact%step%pushes_at_end = k > 12
          call look(contact, scene, du)
          way = 0.0_wp*du
          call draw_random(way)
@@ -185,6 +187,7 @@ contains
                do s = 1, 2
                   call check_near(error, dot_product(reshape(item(i)%t1(:, :n, s), [3*n]), by), &
                      (up(i)%slip(s) - down(i)%slip(s))/(2.0_wp*step), bound, 1.0_wp, "gradient")
+                  if (k > 12) cycle
                   call check_near(error, matmul(item(i)%ht(:3*n, :3*n, s), by), &
                      reshape((up(i)%t(:, &
                      :n, s) - down(i)%t(:, :n, s))/(2.0_wp*step), [3*n]), bound, &
@@ -193,7 +196,7 @@ contains
             end associate
          end do
       end do
-      call check_true(error, n_seen > 40, "conditions on the same nodes")
+      call check_true(error, n_seen > 80, "conditions on the same nodes")
    end subroutine test_derivatives
 
    !> Friction that acts by the end of a step alone: directions and lengths are those there, and
