@@ -83,7 +83,7 @@ contains
       end do
    end subroutine list_owners
 
-   !> The nodes of a side of the slave at constraint `i`: of its first facet its vertex and the next.
+   !> The nodes of a side of the slave at constraint `i`: its vertex on the first facet and the next.
    pure function mortar_slave_side(self, own, i) result(side)
       class(mortar_slave_t), intent(in) :: self
       integer, intent(in) :: own(:)              !! nodes of the slave
