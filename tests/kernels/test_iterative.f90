@@ -379,35 +379,61 @@ contains
          .not. any(abs(x - 2.0_wp**70*y) > 0.0_wp), "the same bits")
    end subroutine test_powers_of_two
 
-   !> A definite matrix of which what is left out takes the last pivot: four unknowns in a ring,
-   !> after D. S. Kershaw, J. Comput. Phys. 26 (1978) 43-65, each with a block of its own.
+   !> Squares of what each of n by n points differs by from the mean of its four neighbours on a
+   !> torus, as of a plate, with a little mass: far from dominated by its diagonal.
+   subroutine plate(n, mass, a)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: mass
+      type(csr_t), intent(out) :: a
+      integer, parameter :: m = 5
+      real(dp), parameter :: part(m) = [1.0_dp, -0.25_dp, -0.25_dp, -0.25_dp, -0.25_dp]
+      integer, allocatable :: slot(:)
+      integer, dimension((m*n)**2) :: row, column
+      integer :: of(m), p, q, i, k
+      real(dp) :: value((m*n)**2)
+
+      k = 0
+      do q = 0, n - 1
+         do p = 0, n - 1
+            of = 1 + modulo([p, p - 1, p + 1, p, p], n) + n*modulo([q, q, q, q - 1, q + 1], n)
+            do i = 1, m
+               row(k + 1:k + m) = of(i)
+               column(k + 1:k + m) = of
+               value(k + 1:k + m) = part(i)*part
+               k = k + m
+            end do
+            value(k - m**2 + 1) = value(k - m**2 + 1) + mass
+         end do
+      end do
+      call csr_from_entries(a, n*n, n*n, row, column, slot)
+      do k = 1, size(slot)
+         a%value(slot(k)) = a%value(slot(k)) + value(k)
+      end do
+   end subroutine plate
+
+   !> Of such a matrix what is lost to the pattern takes pivots below zero.
    subroutine test_shift(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: row(12) = [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4], &
-         column(12) = [1, 2, 4, 1, 2, 3, 2, 3, 4, 1, 3, 4]
-      real(dp), parameter :: value(12) = [3.0_dp, -2.0_dp, 2.0_dp, -2.0_dp, 3.0_dp, -2.0_dp, &
-         -2.0_dp, 3.0_dp, -2.0_dp, 2.0_dp, -2.0_dp, 3.0_dp]
+      integer, parameter :: m = 7, n = m*m
       type(csr_t) :: a
       type(node_blocks_t) :: blocks
       type(incomplete_cholesky_t) :: factor
       type(iterative_solver_t) :: solver
-      real(dp) :: exact(4, 1)
-      real(wp) :: x(4)
-      integer, allocatable :: slot(:)
+      real(dp) :: b(n, 1), exact(n, 1)
+      real(wp) :: x(n)
       logical :: is_definite, is_singular
 
-      call csr_from_entries(a, 4, 4, row, column, slot)
-      a%value(slot) = value
+      call plate(m, 0.01_dp, a)
       call node_blocks_init(blocks, a)
       call node_blocks_fill(blocks, 1.0_dp, a%value)
       call incomplete_cholesky_factorise(factor, blocks, is_definite)
       call check_true(error, is_definite .and. factor%shift > 0.0_dp, "the diagonal was raised")
       if (allocated(error)) return
+      call random_number(b)
       call start(solver, a, error)
-      if (.not. allocated(error)) call solver%solve([1.0_wp, 0.0_wp, 0.0_wp, 2.0_wp], x, error)
+      if (.not. allocated(error)) call solver%solve(real(b(:, 1), wp), x, error)
       if (allocated(error)) return
-      call dense_solve(dense_of(a), reshape([1.0_dp, 0.0_dp, 0.0_dp, 2.0_dp], [4, 1]), exact, &
-         is_singular)
+      call dense_solve(dense_of(a), b, exact, is_singular)
       call check_near(error, x, real(exact(:, 1), wp), real(tol, wp), maxval(abs(x)), "x")
    end subroutine test_shift
 
