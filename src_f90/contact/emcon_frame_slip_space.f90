@@ -45,7 +45,7 @@ contains
 
    !> Slip along two directions in the plane of the frame where `axis` is, at right angles: the
    !> first one is as near to that as it can be. Lengths are those of the frame there, too. Friction
-   !> that acts there is opposite to slip, however frame and directions turn and stretch in the step.
+   !> that acts there is opposite to slip, however frame and directions turn and stretch meanwhile.
    pure subroutine frame_slip(x, dx, axis, leaves_second, slip)
       !> Origin, tips of both vectors, point: where they start, how they move [L]
       real(wp), intent(in) :: x(3, 4), dx(3, 4)
