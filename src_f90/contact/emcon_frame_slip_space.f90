@@ -1,8 +1,8 @@
 !> Slip of a point over the plane of a frame of two vectors in space over a step: two numbers.
 !>
-!> The changes of its affine coordinates, times vectors of the frame at a place in the step. Each
-!> has forces without resultant and moment, and rigid turns are no slip. Source: docs/theory.md,
-!> section 14.3.
+!> The changes of its affine coordinates, times the vectors of the frame at a place in the step.
+!> Each has forces without resultant and moment, and rigid turns are no slip. Source:
+!> docs/theory.md, section 14.3.
 module emcon_frame_slip_space
    use emcon_frame_vertex_space, only : at_eta, at_xi, frame_affine, frame_of, frame_vertex_t, &
       n_frame_var
@@ -37,15 +37,15 @@ module emcon_frame_slip_space
    type :: frame_turn_t
       real(wp) :: side(3, 2) = 0.0_wp            !! both of its vectors [L]
       real(wp) :: basis(3, 2) = 0.0_wp           !! directions
-      real(wp) :: by_side(3, 2) = 0.0_wp         !! of the first one to the second, by both [1/L]
+      real(wp) :: by_side(3, 2) = 0.0_wp         !! of the first to the second, by both [1/L]
       real(wp) :: by_along(3) = 0.0_wp           !! and by what it follows
    end type frame_turn_t
 
 contains
 
-   !> Slip along two directions at right angles in the plane of the frame where `axis` is: the first
-   !> one is as near to that as it can be. Lengths are those of the frame there, too. Friction that
-   !> acts there is opposite to slip, however frame and directions turn and stretch in the step.
+   !> Slip along two directions in the plane of the frame where `axis` is, at right angles: the
+   !> first one is as near to that as it can be. Lengths are those of the frame there, too. Friction
+   !> that acts there is opposite to slip, however frame and directions turn and stretch meanwhile.
    pure subroutine frame_slip(x, dx, axis, leaves_second, slip)
       !> Origin, tips of both vectors, point: where they start, how they move [L]
       real(wp), intent(in) :: x(3, 4), dx(3, 4)
@@ -115,8 +115,8 @@ contains
       end associate
    end subroutine add_frame_first
 
-   !> What it adds to the discrete gradient of slip `k`: nothing by the end where the frame is that
-   !> of the start. Where it is that of the end, steps end as they start, and half is by each.
+   !> What it changes the discrete gradient of slip `k` by: nothing by the end where the frame is
+   !> that of the start. Where it is that of the end, steps end as they start, and half is by each.
    pure subroutine add_frame_second(turn, k, place, g, slip)
       type(frame_turn_t), intent(in) :: turn
       integer, intent(in) :: k

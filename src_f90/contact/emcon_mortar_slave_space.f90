@@ -83,17 +83,20 @@ contains
       end do
    end subroutine list_owners
 
-   !> The nodes of a side of the slave at constraint `i`: its vertex on the first facet and the next.
-   pure function mortar_slave_side(self, own, i) result(side)
+   !> A side of the slave at constraint `i`, at x + u: of its first facet, to the next vertex [L].
+   pure function mortar_slave_side(self, own, i, x, u) result(side)
       class(mortar_slave_t), intent(in) :: self
       integer, intent(in) :: own(:)              !! nodes of the slave
       integer, intent(in) :: i                   !! 1..n
-      integer :: side(2)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: side(3)
+      integer :: ends(2)
 
       associate (f => self%split%facet(self%triangle(self%start(i))), &
             m => self%vertex(self%start(i)))
-         side = own(self%weights%node([m, 1 + mod(m, self%weights%n(f))], f))
+         ends = own(self%weights%node([m, 1 + mod(m, self%weights%n(f))], f))
       end associate
+      side = (x(:, ends(2)) - x(:, ends(1))) + (u(:, ends(2)) - u(:, ends(1)))
    end function mortar_slave_side
 
    !> The multiplier of place `k` of `triangle` at the corners of that: the dual one if theta is 1,

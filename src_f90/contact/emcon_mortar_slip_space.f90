@@ -9,14 +9,14 @@ module emcon_mortar_slip_space
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t, slip_axis_t
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_t
-   use emcon_mortar_slave_space, only : mortar_slave_side, mortar_slave_weight
-   use emcon_node_sums, only : node_sums_across, node_sums_first, node_sums_second
+   use emcon_mortar_slave_space, only : mortar_slave_weight
+   use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_look_space, only : patch_cells
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
    implicit none
    private
    public :: mortar_slip_t, mortar_slip_choose, mortar_slip_shift, mortar_slip_of, &
-      slip_sight_t, mortar_slip_axis, mortar_slip_sight, mortar_slip_add
+      slip_sight_t, mortar_slip_sight, mortar_slip_add
 
    !> What the slip of a slave triangle is made of in a step: cells, where triangles of the master
    !> are below it.
@@ -172,22 +172,6 @@ contains
       end do
    end function find_cell
 
-   !> Slip of constraint `i` is counted along a side of the slave.
-   pure type(slip_axis_t) function mortar_slip_axis(faces, i, x, u0, du, place) result(axis)
-      type(mortar_faces_t), intent(in) :: faces
-      integer, intent(in) :: i                   !! 1..n_constraint
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      real(wp), intent(in) :: place              !! of `slip_axis_t`
-      integer :: side(2)
-
-      axis%place = place
-      side = mortar_slave_side(faces, faces%sides%slave%node, i)
-      associate (from => side(1), to => side(2))
-         axis%along = (x(:, to) - x(:, from)) + (u0(:, to) - u0(:, from)) &
-            + place*(du(:, to) - du(:, from))
-      end associate
-   end function mortar_slip_axis
-
    !> Where the vertices below a triangle are.
    pure subroutine mortar_slip_sight(self, stencil, x, u0, du, sight)
       type(mortar_slip_t), intent(in) :: self
@@ -290,16 +274,15 @@ contains
    end subroutine begin_cells
 
    !> The slip of constraint `i` [L].
-   pure function mortar_slip_of(self, faces, i, x, u0, du, place) result(slip)
+   pure function mortar_slip_of(self, faces, i, x, u0, du, axis) result(slip)
       type(mortar_slip_t), intent(in) :: self(:) !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      real(wp), intent(in) :: place              !! of `slip_axis_t`
+      type(slip_axis_t), intent(in) :: axis
       real(wp) :: slip(most_slips)
       integer, parameter :: no_node(0) = 0
       real(wp) :: total
-      type(slip_axis_t) :: axis
       type(slip_sight_t) :: sight
       type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
@@ -308,7 +291,6 @@ contains
       slip = 0.0_wp
       total = total_of(self, faces, i)
       if (.not. total > 0.0_wp) return
-      axis = mortar_slip_axis(faces, i, x, u0, du, place)
       call begin_cells(cells, self, faces, i, 0)
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
@@ -335,17 +317,11 @@ contains
       type(condition_t), intent(inout) :: item
       type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
-      real(wp) :: total, along(item%n_node)
-      integer :: c, k, side(2)
+      real(wp) :: total
+      integer :: c, k
 
       total = total_of(self, faces, i)
       if (.not. total > 0.0_wp) return
-      side = mortar_slave_side(faces, faces%sides%slave%node, i)
-      along = 0.0_wp
-      if (axis%place > 0.0_wp) then
-         along(findloc(item%node(:item%n_node), side(1), 1)) = -1.0_wp
-         along(findloc(item%node(:item%n_node), side(2), 1)) = 1.0_wp
-      end if
       call begin_cells(cells, self, faces, i, item%n_node)
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
@@ -355,35 +331,29 @@ contains
       end do
       do c = 1, cells%n
          call frame_slip(cells%at(:, :, c), cells%way(:, :, c), axis, item%leaves_second, cell)
-         call spread_cell(cell, cells%weight(:, :, c), along, item)
+         call spread_cell(cell, cells%weight(:, :, c), item)
       end do
    end subroutine mortar_slip_add
 
    !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
    !> are 0, so that of the first node says nothing more.
-   pure subroutine spread_cell(slip, weight, along, item)
+   pure subroutine spread_cell(slip, weight, item)
       type(frame_slip_t), intent(in) :: slip
       real(wp), intent(in) :: weight(:, :)       !! (3, n_node)
-      real(wp), intent(in) :: along(:)           !! (n_node) the same of what slip is counted along
       type(condition_t), intent(inout) :: item
-      logical :: is_used(size(weight, 2)), turns
+      logical :: is_used(size(weight, 2))
       integer :: j, s
 
-      turns = any(abs(along) > 0.0_wp)
-      is_used = any(abs(weight) > 0.0_wp, 1) .or. abs(along) > 0.0_wp
+      is_used = any(abs(weight) > 0.0_wp, 1)
       is_used(1) = .true.
       associate (place => pack([(j, j = 1, size(is_used))], is_used))
-         associate (own => transpose(weight(:, place(2:))), side => along(place(2:)))
+         associate (own => transpose(weight(:, place(2:))))
             do s = 1, size(slip%f)
                item%slip(s) = item%slip(s) + slip%f(s)
                call node_sums_first(slip%g(:, s), own, 1.0_wp, place, item%t(:, :, s))
                call node_sums_first(slip%c(:, s), own, 1.0_wp, place, item%t1(:, :, s))
-               if (turns) call node_sums_first(slip%c_along(:, s), reshape(side, [size(side), &
-                  1]), 1.0_wp, place, item%t1(:, :, s))
                if (item%leaves_second) cycle
                call node_sums_second(slip%h(:, :, s), own, 1.0_wp, place, item%ht(:, :, s))
-               if (turns) call node_sums_across(slip%h_along(:, :, s), own, side, 1.0_wp, place, &
-                  item%ht(:, :, s))
             end do
          end associate
       end associate

@@ -11,6 +11,7 @@ module emcon_mortar_space
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
+   use emcon_frame_slip_space, only : slip_axis_t
    use emcon_guards, only : touching_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
@@ -19,9 +20,9 @@ module emcon_mortar_space
    use emcon_mortar_means_space, only : mortar_means_init, mortar_means_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
-   use emcon_mortar_slave_space, only : mortar_slave_weight
-   use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_axis, mortar_slip_choose, &
-      mortar_slip_of, mortar_slip_shift, mortar_slip_sight, mortar_slip_t
+   use emcon_mortar_slave_space, only : mortar_slave_side, mortar_slave_weight
+   use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
+      mortar_slip_shift, mortar_slip_sight, mortar_slip_t
    use emcon_mortar_sum_space, only : mortar_add_facet, mortar_begin_sum, mortar_facet_sums, &
       mortar_sight, sight_t
    use emcon_patch_gap_space, only : patch_sums_t
@@ -51,6 +52,8 @@ module emcon_mortar_space
       logical :: knows_start = .false.                !! from where stencils were chosen
       type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
       type(mortar_slip_t), allocatable :: next_slide(:)    !! of the last motion that was looked at
+      real(wp), allocatable :: along(:, :)            !! (3, n_constraint) sides of the slave that
+                                                      !! it is counted along, as the step begins [L]
       !> (3, nodes that are looked at) the motions that both are of [L]
       real(wp), allocatable :: slide_du(:, :), next_du(:, :)
       !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
@@ -88,6 +91,7 @@ contains
       if (.not. contact_laws_rub(self%laws)) return
       allocate(self%slide(size(self%faces%split%facet)))
       allocate(self%next_slide(size(self%faces%split%facet)))
+      allocate(self%along(3, self%n_constraint), source=0.0_wp)
    end subroutine mortar_space_init
 
    !> Room for what a step knows, and sizes in the reference.
@@ -168,6 +172,7 @@ contains
          call choose_slips_again(self, x, u0)
       end if
       do i = 1, self%n_constraint
+         self%along(:, i) = mortar_slave_side(self%faces, self%faces%sides%slave%node, i, x, u0)
          self%state(i)%slip_shift = mortar_slip_shift(self%next_slide, self%slide, self%faces, i)
       end do
    end subroutine mortar_begin_step
@@ -457,9 +462,18 @@ contains
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
          call mortar_slip_add(self%slide, self%faces, wanted(k), slot, sight%slip, &
-            mortar_slip_axis(self%faces, wanted(k), x, u0, du, slip_place(self%step)), item(k))
+            axis_of(self, wanted(k)), item(k))
       end do
    end subroutine mortar_evaluate
+
+   !> What slip of constraint `i` is counted along. It stays over the step, so that iterates that
+   !> turn faces far do not turn friction.
+   pure type(slip_axis_t) function axis_of(self, i) result(axis)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i
+
+      axis = slip_axis_t(self%along(:, i), slip_place(self%step))
+   end function axis_of
 
    !> Add a facet to the conditions of its vertices.
    pure subroutine add_facet(self, f, sight, place, target, item)
@@ -516,7 +530,7 @@ contains
 
       slip = 0.0_wp
       if (allocated(self%slide)) slip = mortar_slip_of(self%slide, self%faces, i, x, u0, du, &
-         slip_place(self%step))
+         axis_of(self, i))
    end function mortar_slip
 
    !> Beside what a mean lets in, the chords of curved surfaces cross by their rises.

@@ -7,7 +7,7 @@ module emcon_mortar_sum_space
    use emcon_constraint, only : condition_t
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_t
-   use emcon_mortar_slave_space, only : mortar_slave_side, mortar_slave_weight
+   use emcon_mortar_slave_space, only : mortar_slave_weight
    use emcon_mortar_slip_space, only : slip_sight_t
    use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_cover, &
       patch_open_sums, patch_open_t, patch_sums_t
@@ -156,7 +156,7 @@ contains
       integer :: k, m, n, pass
 
       associate (triangle => self%triangle(self%start(i):self%start(i + 1) - 1))
-         allocate(list(3 + sum(self%stencil(triangle)%n_node)))
+         allocate(list(1 + sum(self%stencil(triangle)%n_node)))
          list(1) = self%node(i)
          n = 1
          do pass = 1, 2
@@ -170,11 +170,7 @@ contains
                   end associate
                end associate
             end do
-            if (pass == 2) cycle
-            ! Directions of slip turn with these.
-            if (item%has_friction) call nodes_append(mortar_slave_side(self, &
-               self%sides%slave%node, i), list, n)
-            item%n_slave = n
+            if (pass == 1) item%n_slave = n
          end do
       end associate
       call condition_start(item, list(:n), self%sides%slave%n_dim)

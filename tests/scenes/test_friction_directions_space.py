@@ -60,7 +60,8 @@ def test_a_mirror_image_turned(kind: str, stiffness: tuple[float, float], tmp_pa
     """Friction is along the diagonal, though faces of both are sheared, and turning all changes nothing. With directions
     that turn with a side of a face it was off by 2E-3 of the push for mu = 1, and by 3E-5 for .3."""
     force = cube_on_a_plate(tmp_path/"a", kind, stiffness, .3, np.eye(3))
-    assert abs(force[0] - force[1]) < 1e-9*abs(force[2])
+    # Mortar has means over triangles whose planes differ, as those of a soft plate's one face do.
+    assert abs(force[0] - force[1]) < (1e-8 if kind == "mortar" else 1e-9)*abs(force[2])
     other = cube_on_a_plate(tmp_path/"b", kind, stiffness, .3, any_turn(1))
     assert np.abs(other - force).max() < 1e-9*abs(force[2])
 
