@@ -434,8 +434,9 @@ def test_what_goes_in_where_no_contact_acts_is_seen_in_a_smaller_increment(tmp_p
     done = Outcome(scene, tmp_path, AUTO, formulation="NODE TO SURFACE")
     assert "bodies would overlap where no contact acts" in done.run.log
     assert done.run.verdict["verdict"] == "good"
-    # A few roundings of the largest coordinate, by the shortest edge.
-    assert done.overlap.by_edge <= 64*EPSILON*2.0/0.05
+    # The tolerance of Newton's method, by the edge: of a hard increment the processor's rounding decides
+    # whether more is gained.
+    assert done.overlap.by_edge <= 1e-10
 
 
 @every_choice
