@@ -431,12 +431,12 @@ def test_what_goes_in_where_no_contact_acts_is_seen_in_a_smaller_increment(tmp_p
                 velocity=(0.3, 0.0))
     scene.block("FLOOR", (-2.0, -0.5), (4.0, 0.5), (13, 1))
     scene.hold("FLOOR", below(-0.5))
-    done = Outcome(scene, tmp_path, AUTO, formulation="NODE TO SURFACE")
+    # With the default tolerance the rounding of a processor decides whether hard increments gain more.
+    done = Outcome(scene, tmp_path, AUTO, formulation="NODE TO SURFACE", tolerance=1e-13)
     assert "bodies would overlap where no contact acts" in done.run.log
     assert done.run.verdict["verdict"] == "good"
-    # The tolerance of Newton's method, by the edge: of a hard increment the processor's rounding decides
-    # whether more is gained.
-    assert done.overlap.by_edge <= 1e-10
+    # A few roundings of the largest coordinate, by the shortest edge.
+    assert done.overlap.by_edge <= 64*EPSILON*2.0/0.05
 
 
 @every_choice
