@@ -28,6 +28,7 @@ contains
          test_case_t("the most, and when", test_most), &
          test_case_t("counts and sums", test_counts), &
          test_case_t("the deepest overlap, of a pair or of none", test_overlap), &
+         test_case_t("an overlap of a fifth of a thickness is told once", test_thickness), &
          test_case_t("bodies in each other of which one has gone through itself", test_own), &
          test_case_t("warnings that differ", test_warnings), &
          test_case_t("linear sections that turn", test_turning), &
@@ -139,6 +140,35 @@ contains
       end do
       call march_free(stepper%march)
    end subroutine test_overlap
+
+   !> Of elements 0.1 thick behind edges of 2, at increments 3 and 4; not behind a wall.
+   subroutine test_thickness(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: depth(5) = [0.5_wp, 0.009_wp, 0.011_wp, 0.02_wp, 0.0_wp]
+      integer, parameter :: n_told(5) = [0, 0, 1, 1, 1]
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k, n_before
+
+      call open(stepper, error)
+      if (allocated(error)) return
+      n_before = stepper%verdict%warnings%n
+      do k = 1, size(depth)
+         increment = increment_t()
+         increment%overlap = overlap_t(depth=depth(k), length=2.0_wp, node=11)
+         increment%overlap%facet(:2) = [7, 8]
+         if (k > 1) increment%overlap%thickness = 0.1_wp
+         call follow(stepper, real(k, wp), increment)
+         associate (told => stepper%verdict%warnings)
+            call check_equal(error, told%n - n_before, n_told(k), "told by " // to_text(k))
+            if (allocated(error)) exit
+            if (k == 3) call check_true(error, index(told%item(told%n)%text, "0.2 of the " // &
+               "thickness") > 0 .and. index(told%item(told%n)%text, "at time 3, node 11 ") > 0, &
+               told%item(told%n)%text)
+         end associate
+      end do
+      call march_free(stepper%march)
+   end subroutine test_thickness
 
    !> The lower block is bent until its right end is in the top of its left one: told where an
    !> overlap names that block, be it one of a pair or of none, and not where it names the other.
