@@ -177,16 +177,19 @@ contains
       has_own_law = allocated(contact%laws%row) .and. .not. self%augments
    end function has_own_law
 
-   !> What is closed as pairs begin to act, and what it stores there.
-   subroutine penalty_start(self, system, motion, begins, closure, energy)
+   !> What is closed as pairs begin to act, and what it stores there. Where no body is in another a
+   !> mean gap below 0, as of curved faces, is no closure: forces act against further motion only.
+   subroutine penalty_start(self, system, motion, begins, is_apart, closure, energy)
       type(penalty_state_t), intent(in) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion       !! none, at the start
       logical, intent(in) :: begins(:)           !! (n_pair) those to look at
+      logical, intent(in) :: is_apart            !! no body is in another
       real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
       real(wp), intent(out) :: energy            !! [M L^2/T^2]
       class(contact_law_t), allocatable :: law
       type(contact_place_t) :: place
+      real(wp) :: open
       integer :: i, id, k
 
       energy = 0.0_wp
@@ -201,7 +204,9 @@ contains
                associate (gap => contact%state(i))
                   if (.not. (gap%is_near .and. gap%is_over)) cycle
                   if (gap%gap0 < -contact%max_penetration_at_start*gap%size) cycle
-                  closure(id) = min(gap%gap0 - gap%closed, 0.0_wp)*contact%share(i)
+                  open = gap%gap0
+                  if (is_apart) open = max(open, 0.0_wp)
+                  closure(id) = min(open - gap%closed, 0.0_wp)*contact%share(i)
                end associate
                if (.not. closure(id) < 0.0_wp) cycle
                place = contact_place_t(self%area(id), self%stiffness(id), contact%share(i), &

@@ -38,7 +38,7 @@ module emcon_march_begin
    use emcon_scheme_registry, only : scheme_create, scheme_user
    use emcon_penalty, only : penalty_begin_step, penalty_free, penalty_start
    use emcon_solver_registry, only : solver_user
-   use emcon_start_overlap, only : start_overlap_check
+   use emcon_start_overlap, only : start_overlap_check, start_overlap_of_means
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
    use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
@@ -130,7 +130,7 @@ contains
             scene, error)
          if (allocated(error)) return
          call penalty_start(self%active%penalty, self%system, motion_of(evaluation_at_end, &
-            scene%x, state%u, at_rest(state%u)), pair_begins(scene%pair, i_step), &
+            scene%x, state%u, at_rest(state%u)), pair_begins(scene%pair, i_step), .false., &
             state%contacts%closure, energy)
       end associate
       self%ledger%contact_energy = self%ledger%contact_energy + energy
@@ -250,13 +250,17 @@ contains
          if (allocated(error)) return
          if (state%clock%i_step == 1 .and. .not. state%clock%time > 0.0_wp) call penalty_start( &
             self%active%penalty, self%system, motion_of(evaluation_at_end, scene%x, state%u, &
-            at_rest(state%u)), pair_acts(scene%pair, 1), state%contacts%closure, &
+            at_rest(state%u)), pair_acts(scene%pair, 1), &
+            .not. step%contact%resolves_overclosure, state%contacts%closure, &
             self%ledger%contact_energy)
          call near_laws_begin_step(self%active%near_laws, self%system, scene, step)
          call begin_overclosure(self, scene, step)
          if (state%clock%i_step == 1 .and. .not. (state%clock%time > 0.0_wp &
-            .or. step%contact%resolves_overclosure)) call start_overlap_check(self, scene, error)
-         if (allocated(error)) return
+            .or. step%contact%resolves_overclosure)) then
+            call start_overlap_check(self, scene, error)
+            if (allocated(error)) return
+            if (.not. step_is_dynamic(step)) call start_overlap_of_means(self, scene)
+         end if
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return
          call begin_times(self, scene, step)

@@ -2,20 +2,27 @@
 !> edges that cross or bodies whose faces lie in the same planes: what nodes penetrate is told
 !> before, with the gaps. And bodies that are in each other as a later step takes their pair in.
 module emcon_start_overlap
+   use emcon_contact, only : gap_state_t
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_evaluation, only : evaluation_at_end
+   use emcon_gaps, only : pair_measure, pair_search
    use emcon_guards, only : touching_bar
+   use emcon_interactions, only : formulation_nts, formulation_user
    use emcon_kinds, only : wp
-   use emcon_motion, only : at_rest
+   use emcon_motion, only : at_rest, motion_of
    use emcon_march_types, only : march_t
    use emcon_overlap_check, only : overlap_check_step, overlap_t
    use emcon_overlap_query, only : overlap_text
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_surface_nodes, only : surface_nodes
-   use emcon_text, only : to_text
+   use emcon_text, only : note_add, to_text
    implicit none
    private
-   public :: start_overlap_check
+   public :: start_overlap_check, start_overlap_of_means
+
+   !> Mean gaps that begin below 0 by so much of an edge, with no node behind, are told.
+   real(wp), parameter :: least_lift = 1.0e-3_wp
 
 contains
 
@@ -62,6 +69,50 @@ contains
             // text // cure)
       end associate
    end subroutine start_overlap_check
+
+   !> Mean gaps over curved faces may begin below 0 with no node behind a surface; a static step moves
+   !> the bodies apart by that. Source: docs/theory.md, section 4.4.
+   subroutine start_overlap_of_means(march, scene)
+      type(march_t), intent(inout) :: march
+      type(scene_t), intent(in) :: scene
+      real(wp) :: depth, edge
+      integer :: i
+
+      do i = 1, size(scene%pair)
+         associate (pair => scene%pair(i), contact => march%system%contact(i)%contact)
+            if (pair%formulation == formulation_nts .or. pair%formulation == formulation_user &
+               .or. pair%slack > 0.0_wp .or. contact%step%is_idle) cycle
+            call pair_search(march%system, i, motion_of(evaluation_at_end, scene%x, march%state%u, &
+               at_rest(march%state%u)))
+            call pair_measure(march%system, i, scene%x, march%state%u, at_rest(march%state%u))
+            call deepest_of(contact%state, depth, edge)
+            if (.not. depth > least_lift*edge) cycle
+            call note_add(march%warnings, "the mean gaps of surface " // &
+               scene%surface(pair%slave)%name // " begin below 0 by up to " // to_text(depth, 3) &
+               // ", " // to_text(depth/edge, 2) // " of an edge, with no node behind surface " &
+               // scene%surface(pair%master)%name // ": faces that curve away touch in the mean " &
+               // "before their nodes do, and the first increment moves the surfaces apart by " // &
+               "that. Displacements of this size need a finer slave surface, or TYPE=NODE TO " // &
+               "SURFACE")
+         end associate
+      end do
+   end subroutine start_overlap_of_means
+
+   !> How far the gap that is closed farthest by its edge is, and the edge; 0 and 1: none is closed.
+   pure subroutine deepest_of(state, depth, edge)
+      type(gap_state_t), intent(in) :: state(:)
+      real(wp), intent(out) :: depth, edge       !! [L]
+      integer :: i
+
+      depth = 0.0_wp
+      edge = 1.0_wp
+      do i = 1, size(state)
+         if (.not. (state(i)%is_near .and. state(i)%is_over)) cycle
+         if (.not. -state(i)%gap0*edge > depth*state(i)%size) cycle
+         depth = -state(i)%gap0
+         edge = state(i)%size
+      end do
+   end subroutine deepest_of
 
    !> The pair whose surfaces have what the overlap names; 0: none does. Behind a wall any node of
    !> the slave's body may be.
