@@ -70,6 +70,7 @@ module emcon_active_set
       logical :: is_settled = .false.            !! the step is solved, or cannot be
       logical :: one_closes = .false.            !! that does not act
       logical :: is_new_set = .false.            !! others act than in the set before
+      logical :: are_together = .false.          !! all are solved for at once, not a set of them
    end type candidates_t
 
    !> What the step of the deck asks of contact.

@@ -87,6 +87,7 @@ contains
 
       call phase_enter(system%phases, phase_gaps, left)
       if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      self%candidates%are_together = .true.
       self%is_active = self%candidates%takes_part
       call active_set_select(self, system, motion, self%candidates%is_measured)
       call exclude_bound(self, system, motion, .false.)
@@ -151,6 +152,7 @@ contains
       integer :: k, left
 
       call phase_enter(system%phases, phase_gaps, left)
+      self%candidates%are_together = .false.
       call active_set_select(self, system, motion, self%candidates%is_measured)
       call exclude_bound(self, system, motion, .true.)
       self%candidates%acts = .false.
@@ -351,8 +353,8 @@ contains
    end function has_closed
 
    !> Does the `i`-th constraint of a pair, which is no candidate, close? A guard waits: what the
-   !> pairs take in may hold the bodies away from it. In statics one guard bears what others would,
-   !> so that they join one at a time.
+   !> pairs take in may hold the bodies away from it. In sets of statics one guard bears what others
+   !> would, so that they join one at a time.
    subroutine join(self, system, pair, i, motion, had_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -367,7 +369,7 @@ contains
          call look_at_open(self, contact, i, id, closes, status)
          if (.not. closes) return
          if (contact%waits(i) .and. merge(had_changed, self%candidates%have_changed, &
-            self%rules%has_impacts)) return
+            self%rules%has_impacts .or. self%candidates%are_together)) return
          if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) status = step_too_far
          self%candidates%is_back(id) = self%candidates%has_left(id)
          if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &

@@ -52,9 +52,8 @@ module emcon_kept_factor
    !> Operations of a row condensed by iterations, for each entry of the matrix: two times as many
    !> steps as a correction takes, beside which those of a complete factor are four times as fast.
    real(dp), parameter :: condensed_operations = 4.0_dp*14.0_dp*4.0_dp
-   !> From so many constraints on they go through factors of dense blocks together: from fewer on
-   !> where there are three rows of one contact, or two, on the same unknowns.
-   integer, parameter :: least_panels = 200, least_alike = 16
+   !> From so many constraints on they go through factors of dense blocks together.
+   integer, parameter :: least_panels = 16
    !> So many times the rows of a set are kept at most.
    real(dp), parameter :: most_pool = 1.5_dp
 
@@ -377,13 +376,12 @@ contains
       logical, intent(in) :: is_aside            !! also V of their forces, and V^T W alone
       real(dp), intent(in) :: part               !! by which gradients of rows may be others
       type(error_t), allocatable, intent(out) :: error
-      integer :: least, n_push
+      integer :: n_push
 
       n_push = merge(set%n_row, 0, is_aside)
       call factor_rows_begin(self%rows, set%n_row + n_push, n_push)
       call begin_rows(self, set%n_row)
-      least = merge(least_alike, least_panels, is_aside .or. slips_turn(set))
-      if (set%n_row >= least .and. blocks_has_panels(self%blocks)) then
+      if (set%n_row >= least_panels .and. blocks_has_panels(self%blocks)) then
          call reach_panels(self, set, part, error)
          return
       end if
@@ -393,14 +391,6 @@ contains
       if (is_aside) call reach_by_row(self, set%force_rows, n_push, set%n_row, error)
       if (.not. allocated(error)) call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
-
-   !> Has the set rows of slips that have a direction?
-   pure logical function slips_turn(set)
-      type(constraint_set_t), intent(in) :: set
-
-      slips_turn = allocated(set%slip)           ! conditions of explicit steps have no slips
-      if (slips_turn) slips_turn = any(set%slip(:min(set%n_row, size(set%slip))) == most_slips)
-   end function slips_turn
 
    !> The first `n` of `rows`, row by row, behind those that are there.
    subroutine reach_by_row(self, rows, n, before, error)

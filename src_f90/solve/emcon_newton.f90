@@ -14,7 +14,7 @@ module emcon_newton
       next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_is_lost, correction_lay_out, &
       correction_multipliers, correction_solve, correction_t, correction_ticks, correction_work
-   use emcon_early_set, only : early_enough, predicts_new_set
+   use emcon_early_set, only : first_look, look_again, predicts_new_set
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_begin, factor_policy_break_off, &
@@ -81,6 +81,7 @@ module emcon_newton
       type(line_search_t) :: line
       type(factor_policy_t) :: factor_policy     !! of a factor over steps
       logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
+      real(wp) :: look_below = 0.0_wp            !! the relative residual of the next look
       logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
 
@@ -306,8 +307,8 @@ contains
       end do
    end subroutine solve_by_tangents
 
-   !> Once in a solve, where a few digits are right: does the step ask for another set? Where a
-   !> correction takes iterations a look costs little beside it: there is one after each.
+   !> Does the step ask for another set? Asked as the residual falls; where a correction takes
+   !> iterations a look costs little beside it: there is one after each.
    subroutine look(self, system, set, motion, size, status)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -316,18 +317,14 @@ contains
       real(wp), intent(in) :: size               !! relative residual
       integer, intent(inout) :: status           !! `newton_early` if so
       logical :: changes, iterates
-      real(wp) :: left
 
       ! Before any correction the multipliers are those of a guess: where that flies, round-off.
-      if (.not. self%looks_early .or. size > early_enough .or. self%n_solve == 0) return
+      if (.not. self%looks_early .or. size > self%look_below .or. self%n_solve == 0) return
       iterates = self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete
-      self%looks_early = iterates
-      left = huge(left)
-      ! Where something rubs sets change in most steps.
-      if (iterates .or. (self%convergence%is_kept .and. any(set%item(:set%n)%has_friction))) then
-         left = maxval(abs(self%dq))
-      end if
-      call predicts_new_set(system, set, motion, left, changes)
+      self%look_below = size
+      if (.not. iterates) self%look_below = look_again*size
+      call predicts_new_set(system, set, motion, size, maxval(abs(self%dq)), &
+         self%convergence%is_kept, changes)
       if (changes) status = newton_early
    end subroutine look
 
@@ -391,6 +388,7 @@ contains
       if (.not. allocated(self%dlam)) allocate(self%dlam(n_constraint), source=0.0_wp)
       call convergence_begin(self%convergence)
       self%n_solve = 0
+      self%look_below = first_look
       self%work = 0.0_wp
       self%line%is_on = .false.
    end subroutine begin
