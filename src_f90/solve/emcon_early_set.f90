@@ -13,13 +13,11 @@ module emcon_early_set
    use emcon_system, only : system_t
    implicit none
    private
-   public :: predicts_new_set, first_look, look_again, early_enough
+   public :: predicts_new_set, first_look, early_enough
 
-   !> The relative residual below which the solve of a set is first looked at, and the part of it
-   !> below which it is again: a look costs about as much as an evaluation of contact.
-   real(wp), parameter :: first_look = 1.0e-2_wp, look_again = 1.0e-2_wp
-   !> That below which an iterate with all candidates is: its forces are met to a few digits.
-   real(wp), parameter :: early_enough = 1.0e-4_wp
+   !> Relative residuals below which a solve is looked at, which costs about as much as an evaluation
+   !> of contact: that of a set first, and once forces are met to a few digits.
+   real(wp), parameter :: first_look = 1.0e-2_wp, early_enough = 1.0e-4_wp
    !> A constraint pulls clearly by more than this part of the largest multiplier, and by more than
    !> so many relative residuals; a gap is clearly closed by more than this part of an edge.
    real(wp), parameter :: clearly = 1.0e-2_wp, residuals = 10.0_wp

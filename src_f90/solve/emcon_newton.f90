@@ -14,7 +14,7 @@ module emcon_newton
       next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_is_lost, correction_lay_out, &
       correction_multipliers, correction_solve, correction_t, correction_ticks, correction_work
-   use emcon_early_set, only : first_look, look_again, predicts_new_set
+   use emcon_early_set, only : early_enough, first_look, predicts_new_set
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_begin, factor_policy_break_off, &
@@ -307,8 +307,8 @@ contains
       end do
    end subroutine solve_by_tangents
 
-   !> Does the step ask for another set? Asked as the residual falls; where a correction takes
-   !> iterations a look costs little beside it: there is one after each.
+   !> Does the step ask for another set? Looked at twice as the residual falls; where a correction
+   !> takes iterations a look costs little beside it: there is one after each.
    subroutine look(self, system, set, motion, size, status)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -321,8 +321,8 @@ contains
       ! Before any correction the multipliers are those of a guess: where that flies, round-off.
       if (.not. self%looks_early .or. size > self%look_below .or. self%n_solve == 0) return
       iterates = self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete
-      self%look_below = size
-      if (.not. iterates) self%look_below = look_again*size
+      self%look_below = merge(early_enough, 0.0_wp, size > early_enough)
+      if (iterates) self%look_below = size
       call predicts_new_set(system, set, motion, size, maxval(abs(self%dq)), &
          self%convergence%is_kept, changes)
       if (changes) status = newton_early
