@@ -3,12 +3,14 @@
 Bare folders of Debian 12 and Ubuntu 24.04 (debootstrap) with Python and without a compiler. In
 each: `pip install` of the wheel that fits its Python, the lines of README.md, the scenes that are
 drawn in Gmsh from script to picture, in under two minutes each; then CMake and a compiler, and the
-host in C++ from the files of the wheel; with --prefix also from an installed one. Says seconds and
-those of the processor, by which the two minutes are judged where the machine is loaded with other
-work; ends with 1 where something fails.
+host in C++ from the files of the wheel; with --prefix also from an installed one. Says seconds,
+those of the processor (user and system) and the load of the machine. Where the machine is loaded
+with other work, the two minutes are judged by the seconds of the processor. Ends with 1 where
+something fails.
 
-With --source: `make run` of a clone, by phases, in folders of their own, whose compilers stay there;
-where such a folder is new, system packages are installed too.
+With --source: the first lines of README.md, typed: `git clone`, `cd`, and `make run` by phases. The
+folders for this are others, and their compilers stay; where such a folder is new, system packages
+are installed too.
 
 It needs root, debootstrap, and a network; folders that are there already are used again.
 """
@@ -102,7 +104,8 @@ class Bare:
             seconds = min(seconds, busy)
         is_good = done.returncode == 0 and (not limit or seconds < limit)
         last = (done.stdout.strip().splitlines() or [""])[-1]
-        print(f"{self.system.name:8}{what:34}{elapsed:7.1f} s, busy {busy:5.1f} s  "
+        print(f"{self.system.name:8}{what:34}{elapsed:7.1f} s, busy {busy:5.1f} s, "
+              f"load {os.getloadavg()[0]:4.1f}  "
               f"{'' if is_good else 'FAILED  '}{last[:80]}", flush=True)
         if not is_good:
             self.failed.append(what)
@@ -136,9 +139,14 @@ def scenes(bare: Bare, wheel: Path) -> None:
 
 
 def source(bare: Bare) -> None:
-    """`make run` of a clone of what is committed, by phases."""
-    subprocess.run(["git", "clone", "-q", str(ROOT), str(bare.folder/"trial"/"emcon")], check=True)
-    bare.run("apt-get install make", "apt-get update -q && apt-get install -qy --no-install-recommends make")
+    """The first lines of README.md on what is committed; `make run` by phases."""
+    subprocess.run(["git", "clone", "-q", "--bare", str(ROOT), str(bare.folder/"trial"/"served")],
+                   check=True)
+    bare.run("apt-get install git make",
+             "apt-get update -q && apt-get install -qy --no-install-recommends git make")
+    readme = (ROOT/"README.md").read_text()
+    (clone,) = re.findall(r"^    (git clone ADDRESS emcon) ", readme, re.MULTILINE)
+    bare.run(clone, clone.replace("ADDRESS", "served"))
     for what, command in (("system packages", ".ci/setup system"), ("program", "make -j$(nproc) app"),
                           ("Python packages", ".ci/setup python run"), ("Python extension", "make -j$(nproc) pywrap"),
                           ("scene and picture", "make run && test -s build/run/ring.png")):
