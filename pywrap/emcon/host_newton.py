@@ -1,4 +1,8 @@
-"""Newton's method for a host whose contact is an `emcon.interface.Interface`."""
+"""Newton's method for a host whose contact is an `emcon.interface.Interface`.
+
+`emcon_solve_step` of the library cannot serve here: it knows no null space of one set of contacts after
+the other, no `magnitude` of a residual, and no exceptions of `respond` and `solve`.
+"""
 
 from __future__ import annotations
 
