@@ -1,7 +1,7 @@
 """Newton's method for a host whose contact is an `emcon.interface.Interface`.
 
-`emcon_solve_step` of the library cannot serve here: it knows no null space of one set of contacts after
-the other, no `magnitude` of a residual, and no exceptions of `respond` and `solve`.
+`emcon_solve_step` of the library does not serve here: it solves with all candidates only, not in the
+null space of one set of contacts after the other, and it takes no `magnitude` of a residual.
 """
 
 from __future__ import annotations

@@ -342,7 +342,7 @@ def test_contact(tmp_path, scheme, initiation):
     """The block does not go through the wall, and comes back; impulse is what turns it."""
     rows, verdict = states(impact(scheme=scheme, initiation=initiation), tmp_path)
     assert verdict["penetration"] <= 1e-12
-    assert all(reason.startswith("contact has made an energy") for reason in verdict["reasons"])
+    assert all(reason.startswith("contact has added an energy") for reason in verdict["reasons"])
     assert rows[0][2][5, 0] > 0 > rows[-1][3]["px"]
     # Both corners come down on the wall; nothing goes deeper.
     assert max(u[5:8:2, 0].max() for _, u, _, _ in rows) <= 0.1*(1 + 64*EPS)
