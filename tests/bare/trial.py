@@ -90,7 +90,7 @@ class Bare:
     def run(self, what: str, command: str, limit: float = 0.0) -> None:
         """Run a line in the folder /trial; say what, seconds, and the last line that it prints."""
         env = {"HOME": "/root", "LANG": "C.UTF-8", "DEBIAN_FRONTEND": "noninteractive",
-               "MPLBACKEND": "agg", "PATH": "/trial/venv/bin:/usr/local/sbin:/usr/local/bin:"
+               "MPLBACKEND": "agg", "PATH": "/trial/env/bin:/usr/local/sbin:/usr/local/bin:"
                "/usr/sbin:/usr/bin:/sbin:/bin"}
         start, before = time.monotonic(), os.times()
         done = subprocess.run(["chroot", str(self.folder), "sh", "-ec", f"cd /trial; {command}"],
@@ -122,10 +122,11 @@ def scenes(bare: Bare, wheel: Path) -> None:
     bare.run("apt-get purge, of a trial before",
              "apt-get autoremove --purge -qy cmake g++ make || apt-get check")
     bare.run("no compiler", "! command -v cc gcc g++ gfortran make cmake")
-    bare.run("python3 -m venv", "python3 -m venv venv")
     readme = (ROOT/"README.md").read_text()
-    (line,) = re.findall(r"^    (pip install emcon-\S+)", readme, re.MULTILINE)
-    bare.run(line, line)
+    lines = re.findall(r"^    (python3 -m venv env|\. env\S+|pip install emcon-\S+)", readme, re.MULTILINE)
+    assert len(lines) == 3
+    for line in lines:
+        bare.run(line, line)
     bare.run("emcon RING", "emcon input_decks/ring.inp --set h=0.05 --output run")
     bare.run("emcon summary, plot", "emcon summary run/ring && emcon plot run/ring")
     bare.run("a stepper", "python -c \"import emcon; "
