@@ -64,7 +64,10 @@ class Bare:
         self.failed: list[str] = []
 
     def set_up(self) -> None:
-        if not (self.folder/"usr"/"bin"/"python3").exists():
+        is_unfinished = (self.folder/"debootstrap").exists()
+        if is_unfinished:
+            shutil.rmtree(self.folder)
+        if is_unfinished or not (self.folder/"usr"/"bin"/"python3").exists():
             known = Path("/usr/share/debootstrap/scripts")
             keys = list(Path("/usr/share/keyrings").glob(f"{self.system.name}-*"))
             command = ["debootstrap", *([] if keys else ["--no-check-gpg"]), "--variant=minbase",
