@@ -23,7 +23,7 @@ HALF, HEIGHT, GAP = 15.0, 20.0, 0.5
 
 
 def draw(path: Path) -> None:
-    """The mesh: what is to have a name in the deck is a physical group."""
+    """The mesh. A physical group gives a body or a side its name in the model."""
     gmsh_tools.begin()
     shapes = gmsh.model.occ
     ring, _ = shapes.cut([(2, shapes.addDisk(0, 0, 0, OUTER, OUTER))],
@@ -40,7 +40,7 @@ def draw(path: Path) -> None:
 
 
 def scene(mesh: emcon.mesh.Mesh) -> emcon.Model:
-    """Rubber on steel feet, and a block that weighs as steel, at 2.5 m/s."""
+    """A rubber arch with fixed feet, and a block with the density of steel, at 2.5 m/s."""
     model = emcon.Model.from_mesh(mesh, "A block falls onto a rubber arch")
     model.material("RUBBER", density=1.1e-9, coupled_neo_hooke=(3.0, 0.4))
     model.material("BLOCK", density=7.8e-9, coupled_neo_hooke=(200.0, 0.3))
@@ -53,7 +53,7 @@ def scene(mesh: emcon.mesh.Mesh) -> emcon.Model:
 
 
 def picture(base: Path, mesh: emcon.mesh.Mesh) -> Path:
-    """Von Mises stress where the arch is lowest, beside the start."""
+    """Von Mises stress at the start, and when the arch is lowest."""
     with emcon.Results(base) as results:
         times = results.fields.times
         top = results.fields["displacement"][:, mesh.rows(mesh.node_sets["BLOCK_BOTTOM"])[0], 1]
@@ -70,7 +70,7 @@ def main(folder: str = ".") -> None:
     with emcon.Stepper(scene(mesh)) as bumper:
         start = bumper.energies()["total"]
         bumper.run(output=base, progress=sys.stderr.isatty())
-        print(f"{bumper.n_element} elements, energy at the end over that at the start: 1"
+        print(f"{bumper.n_element} elements, energy at the end divided by that at the start: 1"
               f"{bumper.energies()['total']/start - 1:+.0e}")
         print("verdict:", bumper.verdict()["verdict"])
         block = min(bumper.bodies(), key=lambda body: -body.mass)

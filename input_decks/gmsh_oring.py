@@ -2,9 +2,9 @@
 
     pip install gmsh 'emcon[mesh]' pyvista
 
-The section of a rubber ring of 3.5 mm lies in a groove of steel; a lid comes down by 0.8 mm, as bolts
-would draw it. Static, without friction. Units: mm, t, s, so that stresses are in MPa and forces, of a
-seal one millimetre long, in N.
+The section of a rubber ring, 3.5 mm thick, lies in a groove of steel. Bolts pull a lid down by 0.8 mm.
+Static, without friction. Units: mm, t, s, so that stresses are in MPa, and forces in N per millimetre
+of seal.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 
 import emcon.mesh
 
-#: Radius of the section, half the width and the depth of the groove, the way of the lid [mm].
+#: Radius of the section, half the width and the depth of the groove, travel of the lid [mm].
 RADIUS, HALF, DEPTH, WAY = 1.75, 2.05, 2.6, 0.8
-#: What of the way the ring is pressed at the start already, below and above, so that it is held [mm].
+#: Overlap of the ring with groove and lid at the start, so that contact holds it [mm].
 START = 0.02
 #: Where the lid is at the start [mm].
 LOW = 2*(RADIUS - START)
@@ -62,7 +62,7 @@ def scene(mesh: emcon.mesh.Mesh) -> emcon.Model:
     model.boundary("LID_TOP", 1)
     middle = [label for label in mesh.node_sets["RING_OUTER"]
               if abs(mesh.nodes[mesh.rows([label])[0], 0]) < 1e-6]
-    model.boundary(middle, 1)            # by symmetry nothing is borne there
+    model.boundary(middle, 1)            # by symmetry, no force acts there
     model.boundary("LID_TOP", 2)
     model.step("STATIC", 0.5, 1.0, nlgeom=True).contact_interference()
     step = model.step("STATIC", 0.02, 1.0, nlgeom=True)
@@ -82,8 +82,8 @@ def main(folder: str = ".") -> None:
         seal.run(output=base, progress=sys.stderr.isatty())
         bolts = seal.reactions[mesh.rows(mesh.node_sets["LID_TOP"]), 1].sum()
         print(f"{seal.n_element} elements, verdict: {seal.verdict()['verdict']}")
-        print(f"the bolts draw with {-bolts:.1f} N for a millimetre of seal")
-        print(f"pressure of contact up to {seal.pressures().max():.1f} MPa")
+        print(f"the bolts pull with {-bolts:.1f} N per millimetre of seal")
+        print(f"contact pressure up to {seal.pressures().max():.1f} MPa")
     with emcon.Results(base) as results:
         row = mesh.rows(mesh.node_sets["LID_TOP"])[0]
         way = START - results.fields["displacement"][:, row, 1]

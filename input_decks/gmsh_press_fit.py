@@ -2,7 +2,7 @@
 
     pip install gmsh 'emcon[mesh]' pyvista
 
-The axle is 0.05 mm thicker than the hole of the wheel, which has six holes more. Static, linear steel,
+The axle is 0.05 mm thicker than the hole of the wheel, which has six more holes. Static, linear steel,
 without friction. Units: mm, t, s, so that stresses are in MPa.
 """
 
@@ -41,7 +41,7 @@ def draw(path: Path) -> None:
     gmsh_tools.name(wheel, "WHEEL", {
         "BORE": lambda x0, y0, x1, y1: HUB - 0.1 < x1 < HUB + 0.1 and x0 < 0.0,
         "TREAD": lambda x0, y0, x1, y1: x1 - x0 > 1.9*RIM})
-    gmsh_tools.divide(FINE, "SEAT")       # nodes meet nodes: no edge dips into the other body
+    gmsh_tools.divide(FINE, "SEAT")       # equal edges: nodes meet nodes
     gmsh_tools.divide(FINE, "BORE")
     gmsh_tools.write(path, COARSE)
 
@@ -59,7 +59,7 @@ def scene(mesh: emcon.mesh.Mesh) -> emcon.Model:
     step.contact_interference()
     step.boundary(nearest(mesh, 0.0, 0.0))
     step.boundary(nearest(mesh, 0.5*HUB, 0.0), 2)
-    step.boundary(nearest(mesh, RIM, 0.0), 2)          # contact holds the wheel, but to turn
+    step.boundary(nearest(mesh, RIM, 0.0), 2)          # contact holds the wheel, except against rotation
     return model
 
 

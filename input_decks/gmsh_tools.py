@@ -1,4 +1,4 @@
-"""What the scenes that are drawn in Gmsh have in common: names, a mesh, pictures by pyvista."""
+"""Shared by the scenes that are drawn in Gmsh: names, mesh, pictures by pyvista."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def name(body: tuple[int, int], text: str, sides: dict[str, Belongs]) -> None:
 
 
 def divide(size: float, group: str) -> None:
-    """Edges of about a size on the curves of a name, on each a multiple of four: quarters are alike."""
+    """Edges of about this size on the curves of a group; on each a multiple of four, for symmetry."""
     (tag,) = [tag for dim, tag in gmsh.model.getPhysicalGroups(1)
               if gmsh.model.getPhysicalName(dim, tag) == group]
     for curve in gmsh.model.getEntitiesForPhysicalGroup(1, tag):
@@ -50,10 +50,10 @@ def begin() -> None:
 def picture(base: Path, frames: Sequence[int], titles: Sequence[str], *,
             view: tuple[float, float, float], top: float, unit: str = "MPa",
             parts: bool = False) -> Path:
-    """Frames of BASE.vtkhdf side by side, deformed and coloured by von Mises' stress.
+    """Frames of BASE.vtkhdf side by side, deformed and coloured by the von Mises stress.
 
     view    x and y of the middle, half of the height
-    top     stress at the dark end of the colours
+    top     stress at the dark end of the colour scale
     parts   the first frame shows which body is which
     """
     import pyvista

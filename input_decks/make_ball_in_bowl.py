@@ -25,7 +25,7 @@ The bowl is a rigid sphere of radius 2, TYPE=SPHERE with the balls inside, and f
 other, and 0.5 aside, 0.01 above the bowl; gravity 1.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
-What to look at: without friction balls do not roll, and leave along other paths than they came.
+What to look at: without friction the balls slide and do not roll; after the collision they take other paths.
 
 Expected: the total energy constant to 1e-11; the angular momentum about the vertical axis through
           the centre of the bowl 0, as no force has a moment about it, to 1e-11.

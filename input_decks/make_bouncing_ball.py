@@ -24,8 +24,8 @@ Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 What to look at: contact pressure and force on the plate in ParaView; the ball leaves more slowly
 than it came, because the plate keeps vibrating.
 
-Expected: total energy constant to 1e-11 of it; of the ball the momenta along the plate change by
-          the slopes of the bent plate only, because there is no friction.
+Expected: total energy constant to 1e-11 of it; there is no friction, so that the momenta of the
+          ball along the plate change only where the bent plate is inclined.
 
 Made by make_bouncing_ball.py. Change a parameter for one run: --set h=0.0025
 """

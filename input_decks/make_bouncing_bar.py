@@ -25,7 +25,7 @@ Expected: the lower end meets the floor at t = 1 with velocity -10, rests there 
           flies (and vibrates) until 3 + 2/3, rests until 4 + 1/3, and is back at height 5 with
           no vibration at t = 5 + 1/3; then all over again.
           Contact force from rho c v = 300 at first touch, growing with gravity to 500, impulse
-          266.7; with initiation=PERSISTENT with the scatter of nodes that have mass.
+          266.7; with initiation=PERSISTENT it jumps up and down around these values.
           Total energy (kinetic + strain - work of gravity) is 0 at the start.
 
 Made by make_bouncing_bar.py. Change a parameter for one run: --set h=0.0025

@@ -23,14 +23,14 @@ A casing with a loose battery falls on a corner from a height of 1 m, in three d
 
 The casing, {outer} mm, has walls of {wall} mm, one C3D8I across; E = 2400 MPa, nu = 0.38, 1.1 g/cm3. The
 battery, {battery} mm of C3D8, has 1 mm of play to all sides but one; E = 1000 MPa, nu = 0.3, 2.2 g/cm3. The floor,
-TYPE=PLANE, is rigid; mu = {friction} everywhere. It comes at {speed} mm/s, with a corner first.
+TYPE=PLANE, is rigid; mu = {friction} everywhere. It arrives at {speed} mm/s, a corner first.
 Units: mm, t, s, N, MPa, mJ.
 
 What to look at: the corner is pressed in, and the casing rebounds, turning; the battery hits one wall after
 another, and bends the large ones outwards.
 
 Expected: energy plus friction losses constant to 1e-11; the momentum along the floor changes by
-          at most {friction} of what it does across.
+          at most {friction} of the change of that normal to the floor.
 
 Made by make_dropped_casing.py. Change a parameter for one run: --set h=1e-5
 """

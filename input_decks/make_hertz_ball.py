@@ -18,7 +18,7 @@ MASS = 4.0/3.0*math.pi*RADIUS**3*DENSITY
 PLANE = 1.0
 
 HEADING = """
-Hertz's law of impact: an elastic ball hits a rigid plane, by a quarter of the ball.
+Hertz's law of impact: an elastic ball hits a rigid plane; a quarter of the ball is modelled.
 
 Ball of radius 1, E = 1e4, nu = 0.3, mass 4.18879 (the density makes up for what the flat sides of
 the elements cut off), {cells} equal cells of C3D8 over the radius of the largest contact, larger ones
@@ -29,7 +29,7 @@ What to look at: the force of the contact in the history of the pair, the veloci
 
 Expected at speed {speed:g} (Hertz; the whole ball, a quarter has a quarter of the force):
           contact time {time:.6g}, largest force {force:.6g}, radius of the contact {radius:.6g}, approach {depth:.6g},
-          impulse twice that before impact, but for what is left in vibrations, less than 2e-3.
+          impulse twice the momentum before the impact, less what remains as vibration, below 2e-3.
 
 Made by make_hertz_ball.py. Change a parameter for one run: --set h=0.0005
 """

@@ -30,11 +30,11 @@ elastic, small displacements. The hub is larger by {INTERFERENCE:g} than the hol
 overlapping bodies, which CONTACT INTERFERENCE pushes apart. Symmetry on both axes.
 Units: any consistent set (force F, length L; stress F/L^2, thickness 1 L).
 
-What to look at: one pressure all around, without a step that closes or loads anything.
+What to look at: the same pressure all around; one step is enough, without a load.
 
 Expected at the end (Lame): pressure {PRESSURE:.6f}; radial displacement {AT_BORE:.6e} at the bore and
           {AT_RIM:.6e} at the rim. Errors fall with the square of the element size, also where
-          nodes do not meet nodes: gaps are then counted between the arcs through the nodes.
+          nodes do not meet nodes: gaps are then measured between the arcs through the nodes.
 
 Made by make_press_fit.py. Change a parameter for one run: --set formulation=SEGMENT
 """

@@ -15,7 +15,7 @@ from make_hertz_ball import MODULUS, POISSON, RADIUS, STIFFNESS, plane_part
 CONTACT, GAP = 0.05, 0.01
 
 HEADING = """
-Hertz in statics: an elastic ball is pressed on {what}, by a quarter, linear elastic.
+Hertz in statics: an elastic ball is pressed on {what}, a quarter is modelled, linear elastic.
 
 Balls of radius 1, E = 1e4, nu = 0.3, {cells} equal cells of C3D8 over the radius of the contact.
 Planes of symmetry x = 0 and y = 0. The middle plane of the upper ball moves down.

@@ -18,7 +18,7 @@ HEADING = f"""
 Rigid bar on a rigid wall: {SPEED:g} m/s, {ENERGY:g} J.
 
 Source: ANSYS technology showcase, metal bar impact, rigid impact: length {LENGTH:g} m, density
-{DENSITY:g} kg/m^3; the section is a square of the area that its energy says. Neither body deforms,
+{DENSITY:g} kg/m^3; the area of the square section follows from the energy. Neither body deforms,
 so contact alone decides with what velocity the bar comes back.
 Units: m, kg, s, N, J.
 

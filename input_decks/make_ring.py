@@ -52,8 +52,8 @@ Units: any consistent set (length L, mass M, time T; stress M/(L T^2), thickness
 What to look at: the ring flattens while it slides along the foundation, and rebounds.
 The total energy is held through contact and release, and the rim has no mass of its own, which
 makes contact forces smooth (initiation = AUTO takes MASSLESS here). The nodes
-of one side are enough (sides = ONE): none of the flat top comes into the finer rim, as the verdict
-tells. With the nodes of both sides those of the top push the straight edges of the rim, and px changes more.
+of the rim are enough (sides = ONE): no node of the flat top enters the finer rim, as the overlap check
+shows. With both sides, nodes of the top also push the straight edges of the rim, and px changes more.
 
 Expected: total energy {energy:.6g} throughout; ring mass {mass:.6g};
           ring momentum ({px:.6g}, {py:.6g}) before contact;

@@ -37,11 +37,11 @@ def line_force(way: float) -> float:
 HEADING = f"""
 A seal: an O-ring of rubber is pressed into its groove, static, plane strain, no friction.
 
-The section is a disc of {DIAMETER:g} mm, of CPE4H: neo-Hooke, shear modulus {SHEAR:g} MPa, hardly compressible.
+The section is a disc of {DIAMETER:g} mm, of CPE4H: neo-Hooke, shear modulus {SHEAR:g} MPa, nearly incompressible.
 Groove and lid are rigid profiles; the groove is {WIDTH:g} mm wide. The lid comes down by
 {100*SQUEEZE:g} percent of the diameter. Contact holds the ring; its inner nodes on the middle line move up and
 down only.
-Units: mm, N, MPa; forces of a millimetre of the ring.
+Units: mm, N, MPa; forces per millimetre of the ring.
 
 What to look at: the contact pressure, which is what seals: zero at the ends of the flat faces and
 largest in their middle. Change the squeeze: --set squeeze=-1.2 lets the ring meet the walls.

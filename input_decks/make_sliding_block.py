@@ -16,10 +16,10 @@ friction is 0.3, the floor is held. Kelvin-Voigt damping (BETA) keeps the block 
 itself, which an undamped elastic body does under Coulomb's law.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2), thickness 1 L).
 
-What to look at: the way that the block slides; friction_loss beside kinetic in the history;
+What to look at: the distance that the block slides; friction_loss beside kinetic in the history;
 contact_status, 2 while a node slides and 1 once it sticks.
 
-Expected: way v^2/(2 mu g) = 0.666667, at rest after v/(mu g) = 0.666667; at the end friction has
+Expected: distance v^2/(2 mu g) = 0.666667, at rest after v/(mu g) = 0.666667; at the end friction has
           dissipated the kinetic energy of the start, 4, except for what damping did with the vibration.
           total + damping_loss + friction_loss is constant.
 

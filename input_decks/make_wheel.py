@@ -34,7 +34,7 @@ The hole of the tyre is {INTERFERENCE:g} mm smaller than the rigid rim of radius
 on. In step 2 the ground comes up by {WAY:g} mm and meets the tyre. In step 3 the rim turns by {TURN:g} rad;
 friction takes the tyre along, until it slides on the ground: coefficients {ON_RIM:g} on the rim and
 {ON_GROUND:g} on the ground. Rubber: CPE4H, coupled neo-Hooke, E = {MODULUS:g} MPa, nu = {POISSON:g}.
-Units: mm, N, MPa; forces of a millimetre of the wheel.
+Units: mm, N, MPa; forces per millimetre of width.
 
 What to look at: contact_shear on the rim and on the ground, and how the tyre is wound up. The force along
 the ground grows until all of the tread that touches slides, from t = 2.6 on. Above the axle the tyre has

@@ -1,4 +1,8 @@
-"""Newton's method for a host whose contact is an `emcon.interface.Interface`."""
+"""Newton's method for a host whose contact is an `emcon.interface.Interface`.
+
+`emcon_solve_step` of the library does not serve here: it solves with all candidates only, not in the
+null space of one set of contacts after the other, and it takes no `magnitude` of a residual.
+"""
 
 from __future__ import annotations
 

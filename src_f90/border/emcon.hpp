@@ -10,12 +10,9 @@
 
 #include <emcon.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -345,17 +342,8 @@ public:
       call(emcon_hold, of.n_node, held.data());
    }
 
-   // Use unknowns w of the host from now on: see emcon_set_map. `newton` then solves for these.
-   void set_map(const emcon_csr &map)
-   {
-      call(emcon_set_map, &map);
-      const std::size_t n = static_cast<std::size_t>(map.n_row);
-      Map &own = owned_->map;
-      own.n_unknown = map.n_column;
-      own.start.assign(map.row_start, map.row_start + n + 1);
-      own.column.assign(map.column, map.column + map.row_start[n]);
-      own.value.assign(map.value, map.value + map.row_start[n]);
-   }
+   // Use unknowns w of the host from now on: see emcon_set_map.
+   void set_map(const emcon_csr &map) { call(emcon_set_map, &map); }
 
    // The same with the freedoms of the nodes that are neither held (emcon_hold) nor tied to others.
    void set_free_unknowns()
@@ -365,62 +353,29 @@ public:
       set_map(links);
    }
 
-   // A step from the displacements `u0`, solved with all candidates until none is missing. Before,
+   // A whole step from the displacements `u0`, by emcon_solve_step; the forces of the gaps. Before it
    // `du` is the expected motion, and `active` has the flags of the step before (empty: nothing acted);
-   // after it, those of this one. `newton(du, n)` solves with the n rows that are selected: it changes
-   // du, and returns their multipliers. `stop` is that of emcon_begin_friction; empty: none. `h`, if
-   // pairs have damping: the size of the step.
-   template <class Newton>
-   void solve_step(const std::vector<double> &u0, std::vector<double> &du, std::vector<int> &active,
-                   const std::vector<double> &stop, Newton newton, double h = 0)
-   {
-      const int n_node = sizes().n_node, m = sizes().n_constraint;
-      if (active.empty()) active.resize(static_cast<std::size_t>(m));
-      if (active.size() != static_cast<std::size_t>(m))
-         throw InputError(EMCON_ERROR_INPUT, "active has " + std::to_string(active.size())
-            + " flags, but there are " + std::to_string(m) + " constraints");
-      int n = 0, is_done = 0, outcome = EMCON_STEP_DONE;
-      call(emcon_begin_contact, n_node, u0.data(), du.data(), m, active.data(), active.data());
-      if (!stop.empty()) call(emcon_begin_friction, n_node, stop.data());
-      if (!(h <= 0 && h >= 0)) call(emcon_begin_damping, h);
-      while (!is_done) {
-         call(emcon_select_candidates, n_node, u0.data(), du.data(), m, active.data(), &n);
-         const std::vector<double> lam = newton(du, n);
-         call(emcon_update_active, n_node, u0.data(), du.data(), n, lam.data(), nullptr, m,
-              active.data(), &is_done, &outcome);
-      }
-      if (outcome != EMCON_STEP_DONE)
-         throw AnalysisError(outcome, "no set of contacts ends the step: try a smaller one");
-   }
-
-   // Newton's method for solve_step from the displacements `u0`. `solve(du, second, n, columns)` finds
-   // the residual r of the motion du without contact and its derivative K, which gets minus `second`;
-   // it adds r to the last of the n columns, one after the other, and puts K^-1 times each in its
-   // place. There are as many rows as unknowns. It ends where the motion is round-off of the
-   // positions, or does not decrease any more. The model and `u0` have to outlive what is returned.
+   // after it they are those of this step. `solve(du, second, n, columns)` finds the residual r of the
+   // motion du without contact, and its derivative K by the unknowns, from which `second` is
+   // subtracted. It adds r to the last of the n columns, which are stored one after the other, and
+   // replaces each by K^-1 times it. What it throws ends the step and is thrown again. `stop` is that
+   // of emcon_begin_friction, empty: none; `h`, if pairs have damping: the size of the step.
    template <class Solve>
-   std::function<std::vector<double>(std::vector<double> &, int)> newton(
-      const std::vector<double> &u0, Solve solve)
+   std::vector<double> solve_step(const std::vector<double> &u0, std::vector<double> &du,
+                                  std::vector<int> &active, const std::vector<double> &stop,
+                                  Solve solve, double h = 0)
    {
-      if (owned_->map.start.empty())
-         throw InputError(EMCON_ERROR_INPUT, "newton is called before set_map or set_free_unknowns");
-      double reach = 0;
-      for (double place : positions()) reach = std::max(reach, std::fabs(place));
-      return [this, &u0, solve, reach](std::vector<double> &du, int n) {
-         const double eps = std::numeric_limits<double>::epsilon();
-         double last = std::numeric_limits<double>::infinity();
-         std::vector<double> lam(static_cast<std::size_t>(n));
-         for (int iterate = 0; iterate < 40; ++iterate) {
-            const std::vector<double> motion = correction(u0, du, lam, solve);
-            double size = 0;
-            for (double part : motion) size = std::max(size, std::fabs(part));
-            each(owned_->map.seen(), [&](Index i, Index j, double a) { du[i] += a*motion[j]; });
-            if (size <= 4*eps*reach || (last <= size && size < 1e-10*reach)) return lam;
-            last = size;
-         }
-         throw AnalysisError(EMCON_ERROR_ANALYSIS,
-                             "Newton's method does not converge: try a smaller step");
-      };
+      const emcon_sizes of = sizes();
+      for (std::size_t n : {u0.size(), du.size(), stop.empty() ? n_freedom(of) : stop.size()})
+         if (n != n_freedom(of))
+            throw InputError(EMCON_ERROR_INPUT, "u0, du or stop has " + std::to_string(n)
+               + " numbers, but the model has " + std::to_string(n_freedom(of)));
+      if (active.empty()) active.resize(static_cast<std::size_t>(of.n_constraint));
+      std::vector<double> lam(active.size());
+      Equations<Solve> host{owned_.get(), solve};
+      call(emcon_solve_step, of.n_node, u0.data(), du.data(), stop.empty() ? nullptr : stop.data(), h,
+           static_cast<int>(active.size()), active.data(), lam.data(), equations<Solve>, &host);
+      return lam;
    }
 
    // How contacts stick and slide, by the step that was solved last.
@@ -463,50 +418,6 @@ public:
 private:
    struct Owned;
 
-   using Index = std::size_t;
-
-   // A matrix with arrays of its own.
-   struct Map {
-      std::vector<int> start, column;
-      std::vector<double> value;
-      int n_unknown = 0;
-
-      emcon_csr seen() const
-      {
-         return {static_cast<int>(start.size()) - 1, n_unknown, start.data(), column.data(), value.data()};
-      }
-   };
-
-   // The motion of the unknowns with which an iterate goes on, and the multipliers for it.
-   template <class Solve>
-   std::vector<double> correction(const std::vector<double> &u0, const std::vector<double> &du,
-                                  std::vector<double> &lam, const Solve &solve)
-   {
-      const emcon_sizes of = sizes();
-      const Index n = lam.size(), m = static_cast<Index>(owned_->map.n_unknown);
-      emcon_constraint_report rows;
-      emcon_csr second;
-      double taken = 0;
-      std::vector<double> columns(m*(n + 1)), damping(n_freedom(of)), w(n*n);
-      double *const last = columns.data() + m*n;
-      call(emcon_evaluate_contact, of.n_node, u0.data(), du.data(), &rows);
-      call(emcon_law_forces, of.n_node, damping.data(), &taken);
-      call(emcon_curvature, static_cast<int>(n), lam.data(), &second);
-      each(rows.discrete_gradient, [&](Index k, Index j, double g) { columns[m*k + j] = g; });
-      each(owned_->map.seen(), [&](Index i, Index j, double a) { last[j] -= a*damping[i]; });
-      solve(du, second, static_cast<int>(n) + 1, columns.data());
-      std::vector<double> opening(rows.defect, rows.defect + n), motion(m);
-      each(rows.end_gradient, [&](Index k, Index j, double c) {
-         for (Index l = 0; l < n; ++l) w[n*k + l] += c*columns[m*l + j];
-         opening[k] -= c*last[j];
-      });
-      if (n > 0) call(emcon_solve_contacts, static_cast<int>(n), w.data(), opening.data(), lam.data());
-      for (Index j = 0; j < m; ++j) motion[j] = -last[j];
-      for (Index l = 0; l < n; ++l)
-         for (Index j = 0; j < m; ++j) motion[j] += columns[m*l + j]*lam[l];
-      return motion;
-   }
-
    // A function that was given, and the model whose call it may end.
    template <class Function>
    struct Given {
@@ -517,7 +428,6 @@ private:
    // Stays where it is when a Model is moved.
    struct Owned {
       emcon_model *model = nullptr;
-      Map map;
       std::exception_ptr thrown;
       std::vector<std::unique_ptr<Given<PointFunction>>> points;
       std::vector<std::unique_ptr<Given<ForceFunction>>> forces;
@@ -525,6 +435,13 @@ private:
       Owned(const Owned &) = delete;
       Owned &operator=(const Owned &) = delete;
       ~Owned() { emcon_close(model); }
+   };
+
+   // The equations of a host, and the model whose step they may end.
+   template <class Solve>
+   struct Equations {
+      Owned *owner;
+      Solve &solve;
    };
 
    struct Callbacks {
@@ -620,6 +537,17 @@ private:
       return guarded(given->owner, [&] {
          given->function(n_node, u0, du, force, magnitude, energy,
                          wants_tangent ? tangent : nullptr);
+         return 0;
+      });
+   }
+
+   template <class Solve>
+   static int equations(void *user, int n_freedom, const double *du, const emcon_csr *second,
+                        int /* n_unknown */, int n_column, double *columns)
+   {
+      auto *host = static_cast<Equations<Solve> *>(user);
+      return guarded(host->owner, [&] {
+         host->solve(std::vector<double>(du, du + n_freedom), *second, n_column, columns);
          return 0;
       });
    }

@@ -82,24 +82,23 @@ contains
       integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
       real(wp), intent(inout) :: of_node(:, :)   !! components of nodes, twice
       real(wp) :: full(size(part, 2)*size(by), size(part, 2)*size(by))
-      integer :: a, i, j, k
+      integer :: n_dim, a, i, j, k
 
+      n_dim = size(part, 2)
       full = 0.0_wp
-      associate (n_dim => size(part, 2))
-         do k = 1, size(by)
-            if (.not. abs(by(k)) > 0.0_wp) cycle
-            do j = 1, size(weight, 2)
-               do i = 1, size(by)
-                  do a = 1, n_dim
-                     associate (to => full(n_dim*(i - 1) + 1:n_dim*i, n_dim*(k - 1) + a))
-                        to = to + weight(i, j)*by(k)*part(n_dim*(j - 1) + 1:n_dim*j, a)
-                     end associate
-                  end do
+      do k = 1, size(by)
+         if (.not. abs(by(k)) > 0.0_wp) cycle
+         do j = 1, size(weight, 2)
+            do i = 1, size(by)
+               do a = 1, n_dim
+                  associate (to => full(n_dim*(i - 1) + 1:n_dim*i, n_dim*(k - 1) + a))
+                     to = to + weight(i, j)*by(k)*part(n_dim*(j - 1) + 1:n_dim*j, a)
+                  end associate
                end do
             end do
          end do
-         call nodes_add_second(factor, n_dim, full, place, of_node)
-      end associate
+      end do
+      call nodes_add_second(factor, n_dim, full, place, of_node)
    end subroutine node_sums_across
 
 end module emcon_node_sums

@@ -44,13 +44,13 @@ contains
       case (in_both); call put(line, "*" // trim(keyword%name) // ": before and in steps")
       end select
       call put_parameters(line, list, " ", "takes")
-      call put_parameters(line, list, ":", "says nothing")
+      call put_parameters(line, list, ":", "neutral values")
       call put_parameters(line, list, "~", "without effect, with a warning")
       call put_parameters(line, list, "!", "refused")
    end subroutine put_keyword
 
-   !> The parameters of one kind: marked by ~ or !, neither, or : those with a value that says
-   !> nothing.
+   !> The parameters of one kind: marked by ~ or !, neither, or : those with a neutral value,
+   !> which changes nothing.
    pure subroutine put_parameters(line, list, kind, title)
       type(string_t), allocatable, intent(inout) :: line(:)
       character(len=*), intent(in) :: list         !! as in the registry

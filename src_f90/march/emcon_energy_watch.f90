@@ -185,9 +185,9 @@ contains
                " digits (" // to_text(self%dynamic_error/largest, 3) // " of the largest energy)")
          end if
          if (self%contact_made > half_digits*largest + rounding) call note_add(reasons, &
-            "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
+            "contact has added an energy of " // to_text(self%contact_made, 3) // ", " // &
             to_text(self%contact_made/largest, 3) // " of the largest, which is " // &
-            "an error of the time integration; SCHEME=ENERGY MOMENTUM makes none")
+            "an error of the time integration; SCHEME=ENERGY MOMENTUM adds none")
          if (self%contact_kept > energy_bar*largest + rounding) call note_add(reasons, &
             "penalty contact has gained or lost an energy of " // &
             to_text(self%contact_kept, 3) // ", " // to_text(self%contact_kept/largest, 3) // &

@@ -3,7 +3,8 @@
 !> The host gives its residual r and a solver by its tangent K, both without contact. In each
 !> iterate the library condenses K du + r = G^T lam to the rows of all candidates, C K^-1 G^T,
 !> solves the small problem of their laws, and moves by K^-1 (G^T lam - r). Source: docs/theory.md,
-!> eq. (14i) and section 6.1.
+!> eq. (14i) and section 6.1. C, C++ and FORTRAN 77 call this; Python has `host_newton.py`, which
+!> says why.
 module emcon_stepper_solve
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_multiply, csr_multiply_transposed, csr_t

@@ -3,12 +3,14 @@
 Bare folders of Debian 12 and Ubuntu 24.04 (debootstrap) with Python and without a compiler. In
 each: `pip install` of the wheel that fits its Python, the lines of README.md, the scenes that are
 drawn in Gmsh from script to picture, in under two minutes each; then CMake and a compiler, and the
-host in C++ from the files of the wheel; with --prefix also from an installed one. Says seconds and
-those of the processor, by which the two minutes are judged where the machine is loaded with other
-work; ends with 1 where something fails.
+host in C++ from the files of the wheel; with --prefix also from an installed one. Says seconds,
+those of the processor (user and system) and the load of the machine. Where the machine is loaded
+with other work, the two minutes are judged by the seconds of the processor. Ends with 1 where
+something fails.
 
-With --source: `make run` of a clone, by phases, in folders of their own, whose compilers stay there;
-where such a folder is new, system packages are installed too.
+With --source: the first lines of README.md, typed: `git clone`, `cd`, and `make run` by phases. The
+folders for this are others, and their compilers stay; where such a folder is new, system packages
+are installed too.
 
 It needs root, debootstrap, and a network; folders that are there already are used again.
 """
@@ -62,7 +64,10 @@ class Bare:
         self.failed: list[str] = []
 
     def set_up(self) -> None:
-        if not (self.folder/"usr"/"bin"/"python3").exists():
+        is_unfinished = (self.folder/"debootstrap").exists()
+        if is_unfinished:
+            shutil.rmtree(self.folder)
+        if is_unfinished or not (self.folder/"usr"/"bin"/"python3").exists():
             known = Path("/usr/share/debootstrap/scripts")
             keys = list(Path("/usr/share/keyrings").glob(f"{self.system.name}-*"))
             command = ["debootstrap", *([] if keys else ["--no-check-gpg"]), "--variant=minbase",
@@ -88,7 +93,7 @@ class Bare:
     def run(self, what: str, command: str, limit: float = 0.0) -> None:
         """Run a line in the folder /trial; say what, seconds, and the last line that it prints."""
         env = {"HOME": "/root", "LANG": "C.UTF-8", "DEBIAN_FRONTEND": "noninteractive",
-               "MPLBACKEND": "agg", "PATH": "/trial/venv/bin:/usr/local/sbin:/usr/local/bin:"
+               "MPLBACKEND": "agg", "PATH": "/trial/env/bin:/usr/local/sbin:/usr/local/bin:"
                "/usr/sbin:/usr/bin:/sbin:/bin"}
         start, before = time.monotonic(), os.times()
         done = subprocess.run(["chroot", str(self.folder), "sh", "-ec", f"cd /trial; {command}"],
@@ -102,7 +107,8 @@ class Bare:
             seconds = min(seconds, busy)
         is_good = done.returncode == 0 and (not limit or seconds < limit)
         last = (done.stdout.strip().splitlines() or [""])[-1]
-        print(f"{self.system.name:8}{what:34}{elapsed:7.1f} s, busy {busy:5.1f} s  "
+        print(f"{self.system.name:8}{what:34}{elapsed:7.1f} s, busy {busy:5.1f} s, "
+              f"load {os.getloadavg()[0]:4.1f}  "
               f"{'' if is_good else 'FAILED  '}{last[:80]}", flush=True)
         if not is_good:
             self.failed.append(what)
@@ -119,10 +125,11 @@ def scenes(bare: Bare, wheel: Path) -> None:
     bare.run("apt-get purge, of a trial before",
              "apt-get autoremove --purge -qy cmake g++ make || apt-get check")
     bare.run("no compiler", "! command -v cc gcc g++ gfortran make cmake")
-    bare.run("python3 -m venv", "python3 -m venv venv")
     readme = (ROOT/"README.md").read_text()
-    (line,) = re.findall(r"^    (pip install emcon-\S+)", readme, re.MULTILINE)
-    bare.run(line, line)
+    lines = re.findall(r"^    (python3 -m venv env|\. env\S+|pip install emcon-\S+)", readme, re.MULTILINE)
+    assert len(lines) == 3
+    for line in lines:
+        bare.run(line, line)
     bare.run("emcon RING", "emcon input_decks/ring.inp --set h=0.05 --output run")
     bare.run("emcon summary, plot", "emcon summary run/ring && emcon plot run/ring")
     bare.run("a stepper", "python -c \"import emcon; "
@@ -136,9 +143,14 @@ def scenes(bare: Bare, wheel: Path) -> None:
 
 
 def source(bare: Bare) -> None:
-    """`make run` of a clone of what is committed, by phases."""
-    subprocess.run(["git", "clone", "-q", str(ROOT), str(bare.folder/"trial"/"emcon")], check=True)
-    bare.run("apt-get install make", "apt-get update -q && apt-get install -qy --no-install-recommends make")
+    """The first lines of README.md on what is committed; `make run` by phases."""
+    subprocess.run(["git", "clone", "-q", "--bare", str(ROOT), str(bare.folder/"trial"/"served")],
+                   check=True)
+    bare.run("apt-get install git make",
+             "apt-get update -q && apt-get install -qy --no-install-recommends git make")
+    readme = (ROOT/"README.md").read_text()
+    (clone,) = re.findall(r"^    (git clone ADDRESS emcon) ", readme, re.MULTILINE)
+    bare.run(clone, clone.replace("ADDRESS", "served"))
     for what, command in (("system packages", ".ci/setup system"), ("program", "make -j$(nproc) app"),
                           ("Python packages", ".ci/setup python run"), ("Python extension", "make -j$(nproc) pywrap"),
                           ("scene and picture", "make run && test -s build/run/ring.png")):

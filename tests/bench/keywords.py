@@ -12,7 +12,7 @@ import subprocess
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = pathlib.Path(os.environ.get("EMCON", ROOT/"build/release/emcon"))
 PAGE = ROOT/"docs/deck.md"
-COLUMNS = ["takes", "says nothing", "without effect, with a warning", "refused"]
+COLUMNS = ["takes", "neutral values", "without effect, with a warning", "refused"]
 
 
 def quoted(names):

@@ -30,7 +30,7 @@ def test_a_name_narrows_the_list():
     told = emcon("keywords", "*contact pa").stdout
     assert told.startswith("*CONTACT PAIR: before the first step\n   takes: INTERACTION=, TYPE=")
     assert "   without effect, with a warning: SMALLSLIDING, " in told
-    assert "   says nothing: MECHANICALCONSTRAINT=KINEMATIC, OP=NEW\n" in told
+    assert "   neutral values: MECHANICALCONSTRAINT=KINEMATIC, OP=NEW\n" in told
     assert "   refused: NOSEPARATION\n" in emcon("keywords", "SURFACE BEHAVIOR").stdout
     assert emcon("keywords", "gap").stdout == ("changes nothing: *GAP CONDUCTANCE, *GAP HEAT GENERATION: there is no "
                                                "temperature\nnot supported: *GAP: use *CONTACT PAIR with a *SURFACE, "

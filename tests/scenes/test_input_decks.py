@@ -421,7 +421,7 @@ def test_thrown_bar_by_the_trapezoidal_rule(courant, tmp_path):
         run = run_deck(impacts.thrown(), tmp_path / scheme[0], scheme=scheme,
                        initiation="ADMISSIBLE", h=courant*impacts.CROSSING, t_end=2.0)
         grown[scheme] = impacts.growth(run.history)
-        blames = any("contact has made" in reason for reason in run.verdict["reasons"])
+        blames = any("contact has added" in reason for reason in run.verdict["reasons"])
         assert blames == (scheme == "TRAPEZOIDAL")
     assert grown["TRAPEZOIDAL"] > impacts.GROWTH[0]
     assert 0.9 < grown["ENERGY MOMENTUM"] <= 1 + 1e-12

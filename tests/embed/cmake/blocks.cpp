@@ -5,13 +5,14 @@
 // blocks nodes|mortar FRICTION N_STEP prints what came of it, then the displacements of the block.
 #include <emcon.hpp>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 using Vector = std::vector<double>;
 const int N = 3, N_NODE = (N + 1)*(N + 1)*2, N_DOF = 3*N_NODE, N_PLATE = 4, FIRST = 3*N_PLATE, N_ALL = FIRST + N_DOF;
 const double LAME[2] = {60, 40}, H = 0.02, SIZE[3] = {1.0/N, 1.0/N, 0.4};
-
 using Matrix = std::vector<std::array<double, N_DOF>>;
 
 // The integral over a cell of shape functions a and b, a by direction i, b by direction j; -1: not derived.
@@ -120,12 +121,11 @@ struct Host {
                residual += mass[i][j]*2/H*(at[k]/H - v[k]) + stiffness[i][j]*(u[k] + 0.5*at[k]);
                tangent[i][j] = 2/(H*H)*mass[i][j] + 0.5*stiffness[i][j];
             }
-            for (int k = second.row_start[i]; k < second.row_start[i + 1]; ++k)
-               tangent[i][second.column[k]] -= second.value[k];
          }
+         emcon::each(second, [&](std::size_t i, std::size_t j, double value) { tangent[i][j] -= value; });
          solve(tangent, columns, n);
       };
-      face.solve_step(u, du, active, stop, face.newton(u, correct));
+      face.solve_step(u, du, active, stop, correct);
       const emcon::Slips slips = face.slips();
       for (int way : slips.way) ++n_status[way];
       lost += slips.loss();

@@ -183,13 +183,22 @@ void land_on_a_floor()
       emcon::each(second, [](std::size_t, std::size_t, double value) { require(value == 0, "a straight floor"); });
       for (int i = 0; i < 4; ++i) columns[4*(n - 1) + i] += at[4 + i] - expected[4 + i];
    };
-   refused("before set_map or set_free_unknowns", [&] { face.newton(u, towards); });
    face.set_free_unknowns();
-   face.solve_step(u, du, active, {}, face.newton(u, towards));
+   try {
+      face.solve_step(u, du, active, {}, [](const std::vector<double> &, const emcon_csr &, int, double *) { throw 17; });
+      require(false, "what the host's equations throw is thrown");
+   } catch (int thrown) {
+      require(thrown == 17 && du == expected, "it is thrown again, and nothing has moved");
+   }
+   const std::vector<double> lam = face.solve_step(u, du, active, {}, towards);
    for (int i = 0; i < 8; ++i) require(std::abs(du[i] - 0.5*expected[i]) < 1e-15, "the feet stand on the floor");
+   for (double force : lam) require(std::abs(force - 0.1) < 1e-15, "it holds each with what the host lacks");
    require(active.size() == 2 && active[0] && active[1] && face.slips().loss() == 0, "both of them, without friction");
    active.resize(3);
-   refused("active has 3 flags, but there are 2", [&] { face.solve_step(u, du, active, {}, face.newton(u, towards)); });
+   refused("n_constraint is 3", [&] { face.solve_step(u, du, active, {}, towards); });
+   active.resize(2);
+   refused("du or stop has 6 numbers, but the model has 8",
+           [&] { face.solve_step(u, du, active, std::vector<double>(6), towards); });
 }
 
 // Two masses with damping between them and the floor: it takes what is missing from the energy.
@@ -221,8 +230,8 @@ void bounce_with_damping()
       du = v;
       for (double &motion : du) motion *= h;
       if (step == 4) refused("the size of the step is to be told",
-                             [&] { face.solve_step(u, du, active, {}, face.newton(u, solve)); });
-      face.solve_step(u, du, active, {}, face.newton(u, solve), h);
+                             [&] { face.solve_step(u, du, active, {}, solve); });
+      face.solve_step(u, du, active, {}, solve, h);
       face.call(emcon_law_forces, 4, push.data(), &part);
       taken += part;
       for (int i = 0; i < 8; ++i) {
