@@ -48,6 +48,9 @@ module emcon_convergence
    !> no more of them on the way to the end: the sizes need not be found again.
    real(wp), parameter :: near = 1.0e-2_wp
 
+   !> So many of the last residuals are compared with each other.
+   integer, parameter :: n_recent = 3
+
    type :: convergence_t
       logical :: is_kept = .false.               !! corrections are by a kept factor
       integer :: n_kept = 0                      !! by the present one
@@ -62,7 +65,8 @@ module emcon_convergence
       real(wp), allocatable :: history(:)        !! relative residuals so far
       real(wp) :: last = 0.0_wp                  !! the last of these
       real(wp) :: largest_force = 0.0_wp         !! of the solve so far [M L/T^2]
-      real(wp) :: recent(3) = 0.0_wp             !! the last residuals beside that one, newest last
+      !> The last residuals beside that one, the newest at the end
+      real(wp) :: recent(n_recent) = 0.0_wp
       real(wp) :: best = 0.0_wp                  !! the smallest of these so far
       integer :: n_stall = 0                     !! iterations since the best one
       real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
@@ -142,10 +146,10 @@ contains
 
       size = max(norm, defect)
       self%largest_force = max(self%largest_force, force)
-      self%recent(:2) = self%recent(2:)
-      self%recent(3) = size
+      self%recent = cshift(self%recent, 1)
+      self%recent(n_recent) = size
       if (self%largest_force > 0.0_wp) &
-         self%recent(3) = max(norm*(force/self%largest_force), defect)
+         self%recent(n_recent) = max(norm*(force/self%largest_force), defect)
       self%n_history = self%n_history + 1
       self%history(self%n_history) = size
       has_gained = size <= polish_gain*self%last
@@ -222,8 +226,8 @@ contains
       type(convergence_t), intent(inout) :: self
 
       self%n_stall = self%n_stall + 1
-      if (self%recent(3) < stall_gain*self%best) self%n_stall = 0
-      self%best = min(self%best, self%recent(3))
+      if (self%recent(n_recent) < stall_gain*self%best) self%n_stall = 0
+      self%best = min(self%best, self%recent(n_recent))
    end subroutine count_stalls
 
    !> Half of what was taken of the last correction if the last residual is no smaller than one of
@@ -233,7 +237,7 @@ contains
 
       self%damping = min(1.0_wp, 2.0_wp*self%damping)
       if (self%n_history < 4) return
-      if (self%recent(3) >= stall_gain*minval(self%recent(:2))) then
+      if (self%recent(n_recent) >= stall_gain*minval(self%recent(:n_recent - 1))) then
          self%damping = max(least_damping, 0.25_wp*self%damping)
       end if
    end subroutine choose_damping

@@ -178,8 +178,7 @@ contains
          call make_factor(self, system, set, motion, is_fit, error)
          if (allocated(error)) return
          if (.not. is_fit) exit
-         call convergence_judge(self%convergence, norm, defect, yardstick_size(self%forces), &
-            is_rounding, next)
+         call judge(self, norm, defect, is_rounding, next)
          if (next == next_done) return
          if (next == next_give_up) exit
          call look(self, system, set, motion, max(norm, defect), status)
@@ -280,8 +279,7 @@ contains
          end if
          call search(self, system, set, motion, goes_on)
          if (goes_on) cycle
-         call convergence_judge(self%convergence, norm, defect, yardstick_size(self%forces), &
-            is_rounding, next)
+         call judge(self, norm, defect, is_rounding, next)
          if (next /= next_done .and. next /= next_give_up) call look(self, system, set, motion, &
             max(norm, defect), status)
          if (status == newton_early) return
@@ -307,6 +305,17 @@ contains
          end if
       end do
    end subroutine solve_by_tangents
+
+   !> What follows from the residual and the defect that were measured.
+   pure subroutine judge(self, norm, defect, is_rounding, next)
+      type(newton_t), intent(inout) :: self
+      real(wp), intent(in) :: norm, defect
+      logical, intent(in) :: is_rounding         !! nothing else is left
+      integer, intent(out) :: next               !! what it is
+
+      call convergence_judge(self%convergence, norm, defect, yardstick_size(self%forces), &
+         is_rounding, next)
+   end subroutine judge
 
    !> Once in a solve, where a few digits are right: does the step ask for another set? Where a
    !> correction takes iterations a look costs little beside it: there is one after each.
