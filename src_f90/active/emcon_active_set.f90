@@ -255,7 +255,7 @@ contains
       self%n_stale = 0
       call penalty_forget(self%penalty)
       if (self%near_laws%is_on) self%near_laws%is_near = .false.
-      self%is_candidate = self%start%was_active
+      self%is_candidate = self%start%was_active .or. self%is_active
       self%is_left_out = .false.
    end subroutine active_set_restart
 
@@ -306,12 +306,13 @@ contains
    end function is_empty
 
    !> Choose stencils; start from the constraints that acted before and still can, also where the
-   !> step is expected to end. What gives way and stores something acts past an end of its surface
-   !> too: there it gives back.
+   !> step is expected to end, and from those that push as it begins. What gives way and stores
+   !> something acts past an end of its surface too: there it gives back.
    subroutine begin_contact(self, system, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
+      logical :: reaches                         ! in front of its surface
       integer :: pair
 
       self%is_active(:system%first_constraint(1)) = system%acts
@@ -322,12 +323,15 @@ contains
                last => system%first_constraint(pair + 1))
             self%is_active(first:last) = .false.
             if (self%skip_until(pair)%passes .or. self%penalty%is_at_ends) cycle
-            if (.not. any(self%start%was_active(first:last))) then
+            reaches = contact%step%engages > 0.0_wp
+            if (.not. (reaches .or. any(self%start%was_active(first:last)))) then
                call active_set_update_gaps(self, system, pair, motion)
                cycle
             end if
             call active_set_update_gaps(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%start%was_active(first:last) &
+               .or. (reaches .and. contact%state%gap0 < contact%step%engages)
+            self%is_active(first:last) = self%is_active(first:last) &
                .and. contact%state%is_near .and. ((contact%state%is_over &
                .and. stands_at(contact%state, self%rules%gap_tolerance)) &
                .or. penalty_owes(self%penalty, first, last))

@@ -8,7 +8,7 @@ module emcon_lane_sums
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: lane_dot, yardstick_t, yardstick_of, relative_size
+   public :: lane_dot, yardstick_t, yardstick_of, yardstick_size, relative_size
 
    integer, parameter :: n_sum = 8               !! partial sums
    !> What is larger than its yardstick by so many powers of two is not measured any more: its
@@ -61,6 +61,15 @@ contains
       yardstick_of%per_unit = scale(1.0_wp, -power)
       if (largest(v) <= huge(v)) yardstick_of%square = sum_of_squares(v, yardstick_of%per_unit)
    end function yardstick_of
+
+   !> The size itself, at most the largest number; 0 where it is not known.
+   pure real(wp) function yardstick_size(yardstick)
+      type(yardstick_t), intent(in) :: yardstick
+
+      associate (per_unit => yardstick%per_unit)
+         yardstick_size = min(sqrt(yardstick%square), huge(per_unit)*min(per_unit, 1.0_wp))/per_unit
+      end associate
+   end function yardstick_size
 
    !> |v| beside the yardstick's: 0 where v vanishes, huge where it is not finite or out of all
    !> proportion, or where there is nothing to compare it with.

@@ -3,7 +3,8 @@
 !>
 !> After the tolerance is met, corrections with the last factorisation go on down to round-off:
 !> energy is lost to what the residual leaves. Where residuals go up and down, less of each
-!> correction is taken.
+!> correction is taken. Whether they come down is seen beside the largest forces of the solve:
+!> forces of stiff contacts that let go fall with their residual.
 module emcon_convergence
    use emcon_kinds, only : wp
    implicit none
@@ -47,6 +48,9 @@ module emcon_convergence
    !> no more of them on the way to the end: the sizes need not be found again.
    real(wp), parameter :: near = 1.0e-2_wp
 
+   !> So many of the last residuals are compared with each other.
+   integer, parameter :: n_recent = 3
+
    type :: convergence_t
       logical :: is_kept = .false.               !! corrections are by a kept factor
       integer :: n_kept = 0                      !! by the present one
@@ -59,8 +63,11 @@ module emcon_convergence
       integer :: n_iteration = 0
       integer :: n_history = 0
       real(wp), allocatable :: history(:)        !! relative residuals so far
-      real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
-      real(wp) :: best = 0.0_wp
+      real(wp) :: last = 0.0_wp                  !! the last of these
+      real(wp) :: largest_force = 0.0_wp         !! of the solve so far [M L/T^2]
+      !> The last residuals beside that one, the newest at the end
+      real(wp) :: recent(n_recent) = 0.0_wp
+      real(wp) :: best = 0.0_wp                  !! the smallest of these so far
       integer :: n_stall = 0                     !! iterations since the best one
       real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
       integer :: n_polish = 0                    !! corrections with the old tangent
@@ -91,6 +98,8 @@ contains
       self%n_polish = 0
       self%n_stall = 0
       self%damping = 1.0_wp
+      self%largest_force = 0.0_wp
+      self%recent = huge(self%recent)
       self%best = huge(self%best)
       self%last = huge(self%last)
       self%is_polish = .false.
@@ -124,14 +133,23 @@ contains
       if (self%n_history > 0) left = max(left, part_left*min(1.0_wp, kept_floor/self%last))
    end function convergence_accuracy
 
-   !> What to do next, now that the largest relative residual is `size`.
-   pure subroutine convergence_judge(self, size, is_rounding, next)
+   !> What to do next, now that the residual and the defect are known.
+   pure subroutine convergence_judge(self, norm, defect, force, is_rounding, next)
       type(convergence_t), intent(inout) :: self
-      real(wp), intent(in) :: size               !! >= 0
+      real(wp), intent(in) :: norm               !! relative residual, >= 0
+      real(wp), intent(in) :: defect             !! of gaps, relative to the edge, >= 0
+      real(wp), intent(in) :: force              !! size of the forces of `norm` [M L/T^2]
       logical, intent(in) :: is_rounding         !! nothing else is left
       integer, intent(out) :: next               !! one of the `next_` codes
+      real(wp) :: size
       logical :: has_gained
 
+      size = max(norm, defect)
+      self%largest_force = max(self%largest_force, force)
+      self%recent = cshift(self%recent, 1)
+      self%recent(n_recent) = size
+      if (self%largest_force > 0.0_wp) &
+         self%recent(n_recent) = max(norm*(force/self%largest_force), defect)
       self%n_history = self%n_history + 1
       self%history(self%n_history) = size
       has_gained = size <= polish_gain*self%last
@@ -152,9 +170,7 @@ contains
       logical :: is_stalled
 
       self%knows_sizes = size < near
-      self%n_stall = self%n_stall + 1
-      if (size < stall_gain*self%best) self%n_stall = 0
-      self%best = min(self%best, size)
+      call count_stalls(self)
       next = next_done
       if (size <= self%tolerance .and. .not. self%polishes) return
       if (size <= round_off .or. (size <= kept_floor .and. .not. has_gained)) return
@@ -197,9 +213,7 @@ contains
          self%n_polish = self%n_polish + 1
          return
       end if
-      self%n_stall = self%n_stall + 1
-      if (size < stall_gain*self%best) self%n_stall = 0
-      self%best = min(self%best, size)
+      call count_stalls(self)
       call choose_damping(self)
       if (self%n_stall > few_stalls .and. size <= stall_floor) return
       next = next_tangent
@@ -207,19 +221,25 @@ contains
          .or. .not. size < huge(size)) next = next_give_up
    end subroutine judge_newton
 
-   !> Half of what was taken of the last correction if the residual, the last in the history, is no
-   !> smaller than one of the two before it, else twice as much. The first guess may happen to have
-   !> a small one.
+   !> Is the last residual a new best one?
+   pure subroutine count_stalls(self)
+      type(convergence_t), intent(inout) :: self
+
+      self%n_stall = self%n_stall + 1
+      if (self%recent(n_recent) < stall_gain*self%best) self%n_stall = 0
+      self%best = min(self%best, self%recent(n_recent))
+   end subroutine count_stalls
+
+   !> Half of what was taken of the last correction if the last residual is no smaller than one of
+   !> the two before it, else twice as much. The first guess may happen to have a small one.
    pure subroutine choose_damping(self)
       type(convergence_t), intent(inout) :: self
 
       self%damping = min(1.0_wp, 2.0_wp*self%damping)
-      associate (n => self%n_history)
-         if (n < 4) return
-         if (self%last >= stall_gain*minval(self%history(n - 2:n - 1))) then
-            self%damping = max(least_damping, 0.25_wp*self%damping)
-         end if
-      end associate
+      if (self%n_history < 4) return
+      if (self%recent(n_recent) >= stall_gain*minval(self%recent(:n_recent - 1))) then
+         self%damping = max(least_damping, 0.25_wp*self%damping)
+      end if
    end subroutine choose_damping
 
 end module emcon_convergence

@@ -22,7 +22,7 @@ module emcon_newton
       factor_policy_make, factor_policy_renew, factor_policy_t
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_serves
    use emcon_kinds, only : dp, int64, wp
-   use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
+   use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_size, yardstick_t
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take, &
       line_search_work
    use emcon_motion, only : motion_evaluate, motion_t
@@ -179,7 +179,7 @@ contains
          call make_factor(self, system, set, motion, is_fit, error)
          if (allocated(error)) return
          if (.not. is_fit) exit
-         call convergence_judge(self%convergence, max(norm, defect), is_rounding, next)
+         call judge(self, norm, defect, is_rounding, next)
          if (next == next_done) return
          if (next == next_give_up) exit
          call look(self, system, set, motion, max(norm, defect), status)
@@ -280,7 +280,7 @@ contains
          end if
          call search(self, system, set, motion, goes_on)
          if (goes_on) cycle
-         call convergence_judge(self%convergence, max(norm, defect), is_rounding, next)
+         call judge(self, norm, defect, is_rounding, next)
          if (next /= next_done .and. next /= next_give_up) call look(self, system, set, motion, &
             max(norm, defect), status)
          if (status == newton_early) return
@@ -306,6 +306,17 @@ contains
          end if
       end do
    end subroutine solve_by_tangents
+
+   !> What follows from the residual and the defect that were measured.
+   pure subroutine judge(self, norm, defect, is_rounding, next)
+      type(newton_t), intent(inout) :: self
+      real(wp), intent(in) :: norm, defect
+      logical, intent(in) :: is_rounding         !! nothing else is left
+      integer, intent(out) :: next               !! what it is
+
+      call convergence_judge(self%convergence, norm, defect, yardstick_size(self%forces), &
+         is_rounding, next)
+   end subroutine judge
 
    !> Does the step ask for another set? Looked at twice as the residual falls; where a correction
    !> takes iterations a look costs little beside it: there is one after each.

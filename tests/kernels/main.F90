@@ -40,6 +40,7 @@ program main
    use test_contact_states, only : collect_contact_states
    use test_step_begin, only : collect_step_begin
    use test_contact_laws, only : collect_contact_laws
+   use test_convergence, only : collect_convergence
    use test_correction, only : collect_correction
    use test_corotated, only : collect_corotated
    use test_critical_step, only : collect_critical_step
@@ -390,6 +391,7 @@ program main
    call run("saddle_point", collect_saddle_point)
    call run("lane_sums", collect_lane_sums)
    call run("mixing", collect_mixing)
+   call run("convergence", collect_convergence)
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)
    call run("system", collect_system)

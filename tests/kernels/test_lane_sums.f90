@@ -4,7 +4,7 @@ module test_lane_sums
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_lane_sums, only : lane_dot, relative_size, yardstick_of
+   use emcon_lane_sums, only : lane_dot, relative_size, yardstick_of, yardstick_size
    implicit none
    private
    public :: collect_lane_sums
@@ -50,6 +50,8 @@ contains
          unit = scale(1.0_wp, k)
          call check_near(error, relative_size(unit*v, yardstick_of(unit*yard)), expected, 0.0_wp, &
             1.0_wp, "in other units")
+         call check_near(error, yardstick_size(yardstick_of(unit*yard))/unit, norm2(yard), &
+            32.0_wp*epsilon(1.0_wp), 1.0_wp, "the size itself")
       end do
    end subroutine test_units
 
@@ -68,6 +70,8 @@ contains
       call check_near(error, relative_size(big, yardstick_of(big)), 1.0_wp, &
          16.0_wp*epsilon(1.0_wp), 1.0_wp, "the largest numbers")
       call check_true(error, relative_size(big, yardstick_of(v)) >= huge(1.0_wp), "beyond")
+      call check_true(error, yardstick_size(yardstick_of(big)) >= huge(1.0_wp), "the largest size")
+      call check_near(error, yardstick_size(yardstick_of(none)), 0.0_wp, 0.0_wp, 1.0_wp, "no size")
       v(7) = ieee_value(v(7), ieee_quiet_nan)
       call check_true(error, relative_size(v, yardstick_of(big)) >= huge(1.0_wp), "no number")
    end subroutine test_odd

@@ -97,6 +97,30 @@ def test_a_load_goes_in_by_the_curve(behaviour, formulation, load, tmp_path):
     assert run.fields()["contact_force"][-1][:2, 1].sum() == pytest.approx(load, rel=1e-9)
 
 
+def pressed(gap, way, young, clearance, at_touch):
+    """Gap that is left of a bar of length and area 1 whose other end moves by `way` to an exponential."""
+    def missing(left):
+        return at_touch*100.0**(-left/clearance) - young*(way - (gap - left))
+
+    low, high = gap - way, gap + clearance
+    while high - low > 1e-15:
+        middle = 0.5*(low + high)
+        low, high = (middle, high) if missing(middle) > 0 else (low, middle)
+    return low
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-6, 5e-4, 1.1e-3])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_a_stiff_exponential_that_pushes_from_the_start(formulation, gap, tmp_path):
+    """A block within reach of its floor, or just outside, is pressed far beyond that in an increment."""
+    step = "*STEP\n*STATIC\n.5, 1.\n*BOUNDARY\n3, 2, 2, -.02\n4, 2, 2, -.02\n"
+    text = deck("EXPONENTIAL\n.001, 100.", formulation, step, gap=gap)
+    run = run_deck(text, tmp_path)
+    left = gap + run.fields()["displacement"][-1, :2, 1]
+    np.testing.assert_allclose(left, pressed(gap, 0.02, 1e3, 1e-3, 100.0), atol=1e-10)
+    assert run.history["cuts"].sum() == 0
+
+
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
 def test_what_it_stores_does_not_snap(behaviour, formulation, tmp_path):

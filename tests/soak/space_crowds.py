@@ -318,9 +318,11 @@ def judge_cones(record, mu):
 
 
 def judge_work(record, history, deck, most):
-    """Friction takes energy at each contact, where no velocities jump as it stops; with contact that does no work along its normal, as much as the forces of the
-    nodes do over their ways, where no velocities jump."""
-    work = np.einsum("tka,tka->tk", record.shear, record.slip)*record.area*~record.is_rigid[record.node]
+    """Friction takes energy at each contact of nodes whose pressures are their own, where no velocities jump as it stops;
+    with contact that does no work along its normal, as much as the forces of the nodes do over their ways, where no
+    velocities jump."""
+    plain = ~(record.is_rigid | record.has_mean)[record.node]     # a product of means is no work
+    work = np.einsum("tka,tka->tk", record.shear, record.slip)*record.area*plain
     found, least = [], work[record.is_whole].min(initial=0.0)
     if least < -LAW*most:
         found.append(f"friction gives {-least/most:.1e} at a contact")
