@@ -121,6 +121,8 @@ def test_a_line_can_be_typed(page, line, words, helps, tmp_path):
         assert rest[0] == "install"
     elif first.startswith("build/release/emcon"):
         look_at_program(rest, tmp_path)
+    elif rest[:2] == ["-m", "venv"] or first == ".":
+        assert rest[-1].split("/")[0] == "env"
     elif rest[:2] == ["-m", "emcon"] or first == "emcon":
         rest = rest if first == "emcon" else rest[2:]
         if rest != ["--version"]:

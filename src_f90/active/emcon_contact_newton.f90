@@ -43,8 +43,8 @@ module emcon_contact_newton
    !> and the size below which none is looked for.
    integer, parameter :: most_parts = 4
    real(wp), parameter :: enough = 0.9_wp, no_search = 1.0e-7_wp
-   !> Of so many rows corrections of statics come from a factor that is kept, if one may be: a
-   !> tangent takes a solution for each row. In dynamics they do of any number.
+   !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
+   !> solution for each row; where slip has a direction of any number, but for statics.
    integer, parameter :: many = 100
    !> A balance of so many contacts begins with all of them.
    integer, parameter :: several = 8
@@ -227,7 +227,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_static           !! nothing has inertia
 
-      may_keep = (.not. is_static .or. set%n_row >= many) &
+      may_keep = ((self%turns .and. .not. is_static) .or. set%n_row >= many) &
          .and. factor_policy_may_provide(newton%factor_policy) &
          .and. .not. (self%holds .or. self%has_tangent .or. any(abs(newton%driven) > 0.0_wp))
       if (may_keep) may_keep = kept_factor_has_room(newton%correction%kept, set%n_row, &

@@ -38,7 +38,7 @@ module emcon_contact_sets
       contact_sets_begin_anew
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
-   integer, parameter :: most_tried = 10, most_by_trials = 20
+   integer, parameter :: most_tried = 6, most_by_trials = 20
    !> Sets of which some rows follow from others, and are left out: as these close again such sets
    !> may take turns for ever.
    integer, parameter :: most_redundant = 2

@@ -70,12 +70,12 @@ contains
       end associate
    end subroutine start_overlap_check
 
-   !> Mean gaps over curved faces may begin below 0 with no node behind a surface; a static step moves
-   !> the bodies apart by that. Source: docs/theory.md, section 4.4.
+   !> Mean gaps over curved faces may begin below 0 with no node behind a surface; a static step
+   !> moves the bodies apart by that. Source: docs/theory.md, section 4.4.
    subroutine start_overlap_of_means(march, scene)
       type(march_t), intent(inout) :: march
       type(scene_t), intent(in) :: scene
-      real(wp) :: depth, edge
+      real(wp) :: depth, length
       integer :: i
 
       do i = 1, size(scene%pair)
@@ -85,11 +85,11 @@ contains
             call pair_search(march%system, i, motion_of(evaluation_at_end, scene%x, march%state%u, &
                at_rest(march%state%u)))
             call pair_measure(march%system, i, scene%x, march%state%u, at_rest(march%state%u))
-            call deepest_of(contact%state, depth, edge)
-            if (.not. depth > least_lift*edge) cycle
+            call deepest_of(contact%state, depth, length)
+            if (.not. depth > least_lift*length) cycle
             call note_add(march%warnings, "the mean gaps of surface " // &
                scene%surface(pair%slave)%name // " begin below 0 by up to " // to_text(depth, 3) &
-               // ", " // to_text(depth/edge, 2) // " of an edge, with no node behind surface " &
+               // ", " // to_text(depth/length, 2) // " of an edge, with no node behind surface " &
                // scene%surface(pair%master)%name // ": faces that curve away touch in the mean " &
                // "before their nodes do, and the first increment moves the surfaces apart by " // &
                "that. Displacements of this size need a finer slave surface, or TYPE=NODE TO " // &
@@ -98,19 +98,19 @@ contains
       end do
    end subroutine start_overlap_of_means
 
-   !> How far the gap that is closed farthest by its edge is, and the edge; 0 and 1: none is closed.
-   pure subroutine deepest_of(state, depth, edge)
+   !> How far the gap that is closed farthest by its size is, and that size; 0 and 1: none is.
+   pure subroutine deepest_of(state, depth, length)
       type(gap_state_t), intent(in) :: state(:)
-      real(wp), intent(out) :: depth, edge       !! [L]
+      real(wp), intent(out) :: depth, length     !! [L]
       integer :: i
 
       depth = 0.0_wp
-      edge = 1.0_wp
+      length = 1.0_wp
       do i = 1, size(state)
          if (.not. (state(i)%is_near .and. state(i)%is_over)) cycle
-         if (.not. -state(i)%gap0*edge > depth*state(i)%size) cycle
+         if (.not. -state(i)%gap0*length > depth*state(i)%size) cycle
          depth = -state(i)%gap0
-         edge = state(i)%size
+         length = state(i)%size
       end do
    end subroutine deepest_of
 

@@ -1,8 +1,7 @@
 !> Is a set of active constraints seen to be another one before its step is solved to the end?
 !>
-!> What pulls by more than the residual leaves open, or has gone in by more than the last correction
-!> has moved, tells that the set will change: what is left of the way with this one leads nowhere.
-!> The rest of the way is shorter than the last correction. Only that it changes is told here;
+!> Once forces are met to a few digits, what pulls hard or has gone in deep tells that the set will
+!> change: what is left of the way with this one leads nowhere. Only that it changes is told here;
 !> which set follows is judged by emcon_contact_sets, and a set that stands has always been
 !> solved to the end. Source: docs/theory.md, section 6.1.
 module emcon_early_set
@@ -13,32 +12,31 @@ module emcon_early_set
    use emcon_system, only : system_t
    implicit none
    private
-   public :: predicts_new_set, first_look, early_enough
+   public :: predicts_new_set, early_enough
 
-   !> Relative residuals below which a solve is looked at, which costs about as much as an evaluation
-   !> of contact: that of a set first, and once forces are met to a few digits.
-   real(wp), parameter :: first_look = 1.0e-2_wp, early_enough = 1.0e-4_wp
-   !> A constraint pulls clearly by more than this part of the largest multiplier, and by more than
-   !> so many relative residuals; a gap is clearly closed by more than this part of an edge.
-   real(wp), parameter :: clearly = 1.0e-2_wp, residuals = 10.0_wp
+   !> Relative residual from which on a look is worth while.
+   real(wp), parameter :: early_enough = 1.0e-4_wp
+   !> A constraint pulls clearly by more than this part of the largest multiplier, and a gap is
+   !> clearly closed by more than this part of an edge: far more than the residual leaves open. With
+   !> a kept factor it is by more than the last correction: the rest of the way is shorter.
+   real(wp), parameter :: clearly = 1.0e-2_wp
 
 contains
 
-   !> Does the motion, which solves the step to a few digits, ask for another set?
-   subroutine predicts_new_set(system, set, motion, rest, left, of_slips, changes)
+   !> Does the motion, which solves the step to a few digits, ask for another set? Gaps and slips
+   !> below `left` may be those of what is left of the way: huge, what slides is not looked at.
+   subroutine predicts_new_set(system, set, motion, left, changes)
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: rest               !! relative residual
-      real(wp), intent(in) :: left               !! > 0, of gaps and slips on the rest of the way [L]
-      logical, intent(in) :: of_slips            !! what slides is looked at, too
+      real(wp), intent(in) :: left               !! > 0 [L]
       logical, intent(out) :: changes            !! clearly so
       integer :: pair, i, id, k
 
       changes = .false.
       if (set%n > set%n_permanent) changes = minval(set%lam(set%n_permanent + 1:set%n)) &
-         < -max(clearly, residuals*rest)*maxval(abs(set%lam(set%n_permanent + 1:set%n)))
-      do k = set%n_permanent + 1, merge(set%n, 0, of_slips)
+         < -clearly*maxval(abs(set%lam(set%n_permanent + 1:set%n)))
+      do k = set%n_permanent + 1, merge(set%n, 0, left < huge(left))
          ! What slides against the way that its friction has stops, or turns back.
          associate (item => set%item(k))
             if (item%has_friction) changes = changes .or. dot_product(item%response%mu_sigma, &

@@ -14,7 +14,7 @@ module emcon_newton
       next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_is_lost, correction_lay_out, &
       correction_multipliers, correction_solve, correction_t, correction_ticks, correction_work
-   use emcon_early_set, only : early_enough, first_look, predicts_new_set
+   use emcon_early_set, only : early_enough, predicts_new_set
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_factor_policy, only : factor_policy_begin, factor_policy_break_off, &
@@ -81,7 +81,6 @@ module emcon_newton
       type(line_search_t) :: line
       type(factor_policy_t) :: factor_policy     !! of a factor over steps
       logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
-      real(wp) :: look_below = 0.0_wp            !! the relative residual of the next look
       logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
 
@@ -318,8 +317,9 @@ contains
          is_rounding, next)
    end subroutine judge
 
-   !> Does the step ask for another set? Looked at twice as the residual falls; where a correction
-   !> takes iterations a look costs little beside it: there is one after each.
+   !> Once in a solve, where a few digits are right: does the step ask for another set? Where a
+   !> correction takes iterations a look costs little beside it: there is one after each. A tangent
+   !> leaves so little that gaps and slips which are nearly closed are left to the end.
    subroutine look(self, system, set, motion, size, status)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -327,15 +327,15 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: size               !! relative residual
       integer, intent(inout) :: status           !! `newton_early` if so
-      logical :: changes, iterates
+      logical :: changes
+      real(wp) :: left
 
       ! Before any correction the multipliers are those of a guess: where that flies, round-off.
-      if (.not. self%looks_early .or. size > self%look_below .or. self%n_solve == 0) return
-      iterates = self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete
-      self%look_below = merge(early_enough, 0.0_wp, size > early_enough)
-      if (iterates) self%look_below = size
-      call predicts_new_set(system, set, motion, size, maxval(abs(self%dq)), &
-         self%convergence%is_kept, changes)
+      if (.not. self%looks_early .or. size > early_enough .or. self%n_solve == 0) return
+      self%looks_early = self%convergence%is_kept .and. self%correction%kept%blocks%is_incomplete
+      left = huge(left)
+      if (self%convergence%is_kept) left = maxval(abs(self%dq))
+      call predicts_new_set(system, set, motion, left, changes)
       if (changes) status = newton_early
    end subroutine look
 
@@ -399,7 +399,6 @@ contains
       if (.not. allocated(self%dlam)) allocate(self%dlam(n_constraint), source=0.0_wp)
       call convergence_begin(self%convergence)
       self%n_solve = 0
-      self%look_below = first_look
       self%work = 0.0_wp
       self%line%is_on = .false.
    end subroutine begin

@@ -125,7 +125,7 @@ def test_spinning_ring(tmp_path):
 def test_sliding_block(shown):
     """The way of a rigid block, but for what the block gives way under its weight."""
     deck = DECKS / "sliding_block.inp"
-    (way,) = figures(deck, r"way v\^2/\(2 mu g\) = (\S+), at rest")
+    (way,) = figures(deck, r"distance v\^2/\(2 mu g\) = (\S+), at rest")
     run = shown("sliding_block")
     fields, history = run.fields(), run.history
     block = fields.x[:, 1] >= 0
@@ -185,7 +185,7 @@ def test_snap_fit(tmp_path):
 def test_dropped_casing(shown):
     """What the floor does to the momentum lies in Coulomb's cone, and friction takes all that the energy loses."""
     deck = DECKS/"dropped_casing.inp"
-    (mu,) = figures(deck, r"at most (\S+) of what it does across")
+    (mu,) = figures(deck, r"at most (\S+) of the change of that normal")
     history = shown("dropped_casing").history
     along, across = np.hypot(np.diff(history["px"]), np.diff(history["py"])), np.diff(history["pz"])
     scale = np.ptp(history["pz"])
