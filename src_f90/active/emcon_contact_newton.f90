@@ -13,10 +13,11 @@ module emcon_contact_newton
       constraints_take_hold
    use emcon_contact_newton_condense, only : contact_newton_condense, &
       contact_newton_condense_kept, contact_newton_correct
-   use emcon_contact_newton_type, only : contact_newton_t, rest_t
+   use emcon_contact_newton_type, only : contact_newton_t, first_guess_t, rest_t
    use emcon_contact_problem, only : contact_problem_create
    use emcon_contact_rest, only : contact_rest_defect, contact_rest_missed
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
+   use emcon_coulomb_law, only : slip_status_t
    use emcon_early_set, only : early_enough
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_is_equilibrium
@@ -43,8 +44,8 @@ module emcon_contact_newton
    !> and the size below which none is looked for.
    integer, parameter :: most_parts = 4
    real(wp), parameter :: enough = 0.9_wp, no_search = 1.0e-7_wp
-   !> Of so many rows corrections come from a factor that is kept, if one may be: a tangent takes a
-   !> solution for each row; where slip has a direction of any number, but for statics.
+   !> Corrections come from a factor that is kept, if one may be: in statics, where tangents change,
+   !> of so many rows, as a tangent takes a solution for each.
    integer, parameter :: many = 100
    !> A balance of so many contacts begins with all of them.
    integer, parameter :: several = 8
@@ -190,6 +191,7 @@ contains
          if (i == 0) self%is_searching = self%is_searching .or. self%has_tangent
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
+         if (i == 0 .and. self%by_kept) self%guess = first_guess_t(motion%du, set%lam)
          if (i > 0 .and. is_done(self, newton)) return
          self%early%is_made = self%early%is_allowed .and. i > 0 &
             .and. self%rest%size <= early_enough
@@ -227,7 +229,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_static           !! nothing has inertia
 
-      may_keep = ((self%turns .and. .not. is_static) .or. set%n_row >= many) &
+      may_keep = (.not. is_static .or. set%n_row >= many) &
          .and. factor_policy_may_provide(newton%factor_policy) &
          .and. .not. (self%holds .or. self%has_tangent .or. any(abs(newton%driven) > 0.0_wp))
       if (may_keep) may_keep = kept_factor_has_room(newton%correction%kept, set%n_row, &
@@ -254,11 +256,7 @@ contains
       if (allocated(error)) return
       status = newton_converged
       if (.not. is_found) then
-         if (self%by_kept) then
-            self%rest%best = self%rest%size
-            self%by_kept = .false.
-            self%keeps_tangent = .false.
-         end if
+         if (self%by_kept) call give_up_kept(self, set, motion)
          call find_tangent(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (self%is_driven) call add_driven(newton, system, set, motion)
@@ -267,6 +265,25 @@ contains
       end if
       call contact_newton_correct(self, newton, system, set, error)
    end subroutine find_correction
+
+   !> The factor that is kept does not lead to the end: tangents follow, from where it led to if
+   !> forces are met to a few digits there, else from the first guess.
+   subroutine give_up_kept(self, set, motion)
+      type(contact_newton_t), intent(inout) :: self
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+
+      self%by_kept = .false.
+      self%keeps_tangent = .false.
+      self%rest%best = self%rest%size
+      if (self%rest%size <= early_enough) return
+      motion%du = self%guess%du
+      set%lam = self%guess%lam
+      self%status = slip_status_t()
+      self%rest = rest_t()
+      self%step%is_taken = .false.
+      self%is_condensed = .false.
+   end subroutine give_up_kept
 
    !> Let there be a tangent, unless the last one is kept.
    subroutine find_tangent(self, newton, system, set, motion, status, error)

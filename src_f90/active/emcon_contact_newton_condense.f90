@@ -250,7 +250,7 @@ contains
       type(newton_t), intent(inout) :: newton
       integer :: k
 
-      if (self%turns .and. self%by_kept .and. self%rest%size <= early_enough) then
+      if (self%by_kept .and. self%rest%size <= early_enough) then
          call mixed_step_mix(self%step, maxval([(abs(self%problem%w(k, k)), k = 1, &
             size(self%problem%w, 1))]), newton%dq)
       else

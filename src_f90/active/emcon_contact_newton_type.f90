@@ -9,7 +9,7 @@ module emcon_contact_newton_type
    use emcon_mixed_step, only : mixed_step_t
    implicit none
    private
-   public :: contact_newton_t, early_end_t, rest_t
+   public :: contact_newton_t, early_end_t, first_guess_t, rest_t
 
    !> What is left: relative residual, and what contacts miss.
    type :: rest_t
@@ -28,6 +28,12 @@ module emcon_contact_newton_type
       logical :: goes_on = .false.               !! this one goes on with that
    end type early_end_t
 
+   !> What a factor that is kept begins with.
+   type :: first_guess_t
+      real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) motion [L]
+      real(wp), allocatable :: lam(:)            !! (n_row) multipliers
+   end type first_guess_t
+
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
       type(coulomb_t), allocatable :: law(:)     !! (n) of the contacts; mu = 0: no friction
@@ -44,6 +50,7 @@ module emcon_contact_newton_type
       type(slip_status_t), allocatable :: status(:)
       type(mixed_step_t) :: step
       type(rest_t) :: rest
+      type(first_guess_t) :: guess
       logical :: is_rounding = .false.  !! nothing but round-off is left
       integer :: least_soft = 0         !! first of `softer` that is tried, 0: none
       logical :: is_searching = .false. !! no tangent is wanted

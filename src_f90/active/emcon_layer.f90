@@ -34,7 +34,7 @@ module emcon_layer
    implicit none
    private
    public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, &
-      layer_count, layer_share, layer_find_acting, layer_take_velocities, layer_free
+      layer_count, layer_share, layer_find_acting, layer_take_velocities, layer_guess, layer_free
 
    !> Work below this part of what it is held against is round-off.
    real(wp), parameter :: rounding = 1.0e3_wp*epsilon(1.0_wp)
@@ -121,6 +121,43 @@ contains
          if (self%is_massless(i)) v(:, i) = du(:, i)/h
       end do
    end subroutine layer_take_velocities
+
+   !> First guess of the motion: what has no mass goes with the nodes beside it that have. Its own
+   !> velocity is none to go on with: forces that balance over a step in the mean are off by as
+   !> much, and the other way, at its end, so that it is too large and too small in turn.
+   pure subroutine layer_guess(self, du)
+      type(layer_t), intent(in) :: self
+      real(wp), intent(inout) :: du(:, :)        !! (n_dim, n_node) over the step [L]
+      real(wp) :: total(size(du, 1), size(du, 2))
+      integer :: n(size(du, 2)), i, e
+
+      total = 0.0_wp
+      n = 0
+      do e = 1, size(self%scene%element%kind)
+         associate (nodes => self%scene%element%node(:, e))
+            associate (bare => pack(nodes, find_massless(self, nodes, .true.)), &
+                  heavy => pack(nodes, find_massless(self, nodes, .false.)))
+               do i = 1, size(bare)
+                  total(:, bare(i)) = total(:, bare(i)) + sum(du(:, heavy), 2)
+               end do
+               n(bare) = n(bare) + size(heavy)
+            end associate
+         end associate
+      end do
+      do i = 1, size(n)
+         if (n(i) > 0) du(:, i) = total(:, i)/n(i)
+      end do
+   end subroutine layer_guess
+
+   !> Which of these nodes have no mass, or which have some?
+   pure function find_massless(self, node, is_massless) result(is_meant)
+      type(layer_t), intent(in) :: self
+      integer, intent(in) :: node(:)             !! of an element; 0: none
+      logical, intent(in) :: is_massless
+      logical :: is_meant(size(node))
+
+      is_meant = node > 0 .and. (self%is_massless(max(1, node)) .eqv. is_massless)
+   end function find_massless
 
    !> The layer of `scene` on other massless nodes, with the same laws. The step of the deck has to
    !> begin anew.

@@ -4,6 +4,7 @@ module emcon_march_guess
    use emcon_evaluation, only : evaluation_displacement, evaluation_has_inertia, &
       evaluation_velocity, instant_later, instant_t
    use emcon_kinds, only : wp
+   use emcon_layer, only : layer_guess
    use emcon_march_past, only : march_past_take
    use emcon_march_types, only : march_t
    use emcon_motion, only : motion_t
@@ -41,6 +42,7 @@ contains
       self%motion%offset = 0.0_wp
       self%motion%du = 0.0_wp
       if (has_inertia .and. .not. is_at_rest) self%motion%du = h*self%state%v
+      if (self%layer%is_on .and. has_inertia) call layer_guess(self%layer, self%motion%du)
       where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
       if (.not. self%explicit%is_on) call round_to_rest(self%system%space, scene%x, &
          self%state%u, self%motion%du)

@@ -176,10 +176,12 @@ contains
       if (size <= round_off .or. (size <= kept_floor .and. .not. has_gained)) return
       is_stalled = self%n_stall >= kept_stalls
       if (is_stalled .and. is_rounding) return
-      is_stalled = is_stalled .or. (self%n_kept >= too_old .and. self%best > nearly_done)
       next = next_give_up
       if (.not. size < huge(size) .or. self%n_history > kept_for_tangent*self%maximum) return
       if (is_stalled .and. self%n_renewal > 0) return
+      ! Age is mended once: a factor that is new and as slow has contacts that bend to blame.
+      is_stalled = is_stalled .or. (self%n_kept >= too_old .and. self%n_renewal == 0 &
+         .and. self%best > nearly_done)
       next = merge(next_tangent, next_old_tangent, is_stalled)
       if (is_stalled) then
          self%n_renewal = self%n_renewal + 1
