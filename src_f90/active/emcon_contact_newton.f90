@@ -13,7 +13,7 @@ module emcon_contact_newton
       constraints_take_hold
    use emcon_contact_newton_condense, only : contact_newton_condense, &
       contact_newton_condense_kept, contact_newton_correct
-   use emcon_contact_newton_type, only : contact_newton_t, first_guess_t, rest_t
+   use emcon_contact_newton_type, only : contact_newton_t, kept_part_t, rest_t
    use emcon_contact_problem, only : contact_problem_create
    use emcon_contact_rest, only : contact_rest_defect, contact_rest_missed
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
@@ -74,7 +74,7 @@ contains
 
       call begin(self, newton, set)
       is_static = evaluation_is_equilibrium(motion%evaluation)
-      if (.not. self%early%goes_on) self%by_kept = may_keep(self, newton, system, set, is_static)
+      if (.not. self%early%goes_on) self%kept%is_on = may_keep(self, newton, system, set, is_static)
       ! A belt that contact presses on a drum has no stiffness worth speaking of without contact,
       ! or less than none: its tangent has that of the rows.
       self%holds = self%holds .or. is_static
@@ -187,11 +187,11 @@ contains
          if (allocated(error)) return
          ! The correction to come from here may be the last one, or by the tangent that there is.
          self%is_searching = (i > 0 .and. (self%rest%size <= no_search .or. self%turns)) .or. &
-            (self%by_kept .and. newton%correction%kept%is_made)
+            (self%kept%is_on .and. newton%correction%kept%is_made)
          if (i == 0) self%is_searching = self%is_searching .or. self%has_tangent
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
-         if (i == 0 .and. self%by_kept) self%guess = first_guess_t(motion%du, set%lam)
+         if (i == 0 .and. self%kept%is_on) self%kept = kept_part_t(.true., motion%du, set%lam)
          if (i > 0 .and. is_done(self, newton)) return
          self%early%is_made = self%early%is_allowed .and. i > 0 &
             .and. self%rest%size <= early_enough
@@ -248,7 +248,7 @@ contains
       logical :: is_found
 
       self%keeps_tangent = does_keep_tangent(self, newton)
-      is_found = self%by_kept .and. (self%keeps_tangent .or. &
+      is_found = self%kept%is_on .and. (self%keeps_tangent .or. &
          self%rest%size < enough_by_kept*self%rest%last)
       call count_stall(self)
       if (is_found) call contact_newton_condense_kept(self, newton, system, set, &
@@ -256,7 +256,7 @@ contains
       if (allocated(error)) return
       status = newton_converged
       if (.not. is_found) then
-         if (self%by_kept) call give_up_kept(self, set, motion)
+         if (self%kept%is_on) call give_up_kept(self, set, motion)
          call find_tangent(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (self%is_driven) call add_driven(newton, system, set, motion)
@@ -273,12 +273,12 @@ contains
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
 
-      self%by_kept = .false.
+      self%kept%is_on = .false.
       self%keeps_tangent = .false.
       self%rest%best = self%rest%size
       if (self%rest%size <= early_enough) return
-      motion%du = self%guess%du
-      set%lam = self%guess%lam
+      motion%du = self%kept%du
+      set%lam = self%kept%lam
       self%status = slip_status_t()
       self%rest = rest_t()
       self%step%is_taken = .false.
@@ -319,7 +319,7 @@ contains
       if (is_done) return
       ! What a factor that is kept leaves falls by a part each time: it goes to round-off.
       is_done = self%is_rounding .or. (self%rest%size <= newton%convergence%tolerance &
-         .and. .not. self%by_kept)
+         .and. .not. self%kept%is_on)
       if (newton%convergence%polishes) is_done = is_done .and. &
          self%rest%size > polish_gain*self%rest%last
    end function is_done
@@ -385,7 +385,7 @@ contains
       status = newton_converged
       call phase_enter(system%phases, phase_gaps, left)
       call constraints_take_hold(set)
-      self%rest%has_second = .not. (self%is_searching .or. self%by_kept)
+      self%rest%has_second = .not. (self%is_searching .or. self%kept%is_on)
       call constraints_evaluate(set, system, motion, .not. self%rest%has_second)
       call follow_normals(self, set)
       call constraints_rows(set, system%space%numbering)
@@ -428,13 +428,14 @@ contains
       type(newton_t), intent(in) :: newton
 
       keeps = self%is_condensed .and. .not. self%condensation%is_singular
-      if (self%step%mixes .and. self%by_kept) then
+      if (self%step%mixes .and. self%kept%is_on) then
          ! Mixing sees what is wrong with it.
          keeps = keeps .and. self%rest%size < enough_by_kept*self%rest%last
          return
       end if
-      if (keeps) keeps = (self%rest%size <= newton%convergence%tolerance .and. .not. self%by_kept) &
-         .or. ((self%turns .or. self%by_kept) .and. self%rest%size < enough_kept*self%rest%last)
+      if (keeps) keeps = ((self%turns .or. self%kept%is_on) .and. &
+         self%rest%size < enough_kept*self%rest%last) .or. (.not. self%kept%is_on .and. &
+         self%rest%size <= newton%convergence%tolerance)
    end function does_keep_tangent
 
    !> Of parts of the correction take the first that gains, or that which leaves least.

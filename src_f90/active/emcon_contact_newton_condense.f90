@@ -155,7 +155,7 @@ contains
          do k = 1, size(problem%stiffness)
             problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
          end do
-         if (.not. self%holds .or. self%by_kept) return
+         if (.not. self%holds .or. self%kept%is_on) return
          do k = first + 1, set%n_row
             self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
          end do
@@ -250,7 +250,7 @@ contains
       type(newton_t), intent(inout) :: newton
       integer :: k
 
-      if (self%by_kept .and. self%rest%size <= early_enough) then
+      if (self%kept%is_on .and. self%rest%size <= early_enough) then
          call mixed_step_mix(self%step, maxval([(abs(self%problem%w(k, k)), k = 1, &
             size(self%problem%w, 1))]), newton%dq)
       else

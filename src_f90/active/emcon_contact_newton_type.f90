@@ -9,7 +9,7 @@ module emcon_contact_newton_type
    use emcon_mixed_step, only : mixed_step_t
    implicit none
    private
-   public :: contact_newton_t, early_end_t, first_guess_t, rest_t
+   public :: contact_newton_t, early_end_t, kept_part_t, rest_t
 
    !> What is left: relative residual, and what contacts miss.
    type :: rest_t
@@ -28,11 +28,13 @@ module emcon_contact_newton_type
       logical :: goes_on = .false.               !! this one goes on with that
    end type early_end_t
 
-   !> What a factor that is kept begins with.
-   type :: first_guess_t
+   !> The part of a factor that is kept.
+   type :: kept_part_t
+      logical :: is_on = .false.                 !! corrections come from it
+      ! What it began with:
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) motion [L]
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers
-   end type first_guess_t
+   end type kept_part_t
 
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
@@ -50,13 +52,12 @@ module emcon_contact_newton_type
       type(slip_status_t), allocatable :: status(:)
       type(mixed_step_t) :: step
       type(rest_t) :: rest
-      type(first_guess_t) :: guess
+      type(kept_part_t) :: kept
       logical :: is_rounding = .false.  !! nothing but round-off is left
       integer :: least_soft = 0         !! first of `softer` that is tried, 0: none
       logical :: is_searching = .false. !! no tangent is wanted
       logical :: turns = .false.        !! something rubs, and slip has a direction
       logical :: is_driven = .false.    !! the next correction meets prescribed motion
-      logical :: by_kept = .false.      !! corrections come from a factor that is kept
       logical :: is_condensed = .false. !! by that, or by the tangent
       !> What was condensed last does for the next correction
       logical :: keeps_tangent = .false.
