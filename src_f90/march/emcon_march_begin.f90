@@ -38,7 +38,7 @@ module emcon_march_begin
    use emcon_scheme_registry, only : scheme_create, scheme_user
    use emcon_penalty, only : penalty_begin_step, penalty_free, penalty_start
    use emcon_solver_registry, only : solver_user
-   use emcon_start_overlap, only : start_overlap_check, start_overlap_of_means
+   use emcon_start_overlap, only : start_overlap_check
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
    use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
@@ -126,12 +126,12 @@ contains
 
       associate (i_step => self%state%clock%i_step, state => self%state)
          if (.not. any(pair_begins(scene%pair, i_step))) return
-         if (.not. scene%step(i_step)%contact%resolves_overclosure) call start_overlap_check(self, &
-            scene, error)
+         if (.not. scene%step(i_step)%contact%resolves_overclosure) call start_overlap_check( &
+            self, scene, pair_begins(scene%pair, i_step), error)
          if (allocated(error)) return
          call penalty_start(self%active%penalty, self%system, motion_of(evaluation_at_end, &
-            scene%x, state%u, at_rest(state%u)), pair_begins(scene%pair, i_step), .false., &
-            state%contacts%closure, energy)
+            scene%x, state%u, at_rest(state%u)), pair_begins(scene%pair, i_step), &
+            .not. scene%step(i_step)%contact%resolves_overclosure, state%contacts%closure, energy)
       end associate
       self%ledger%contact_energy = self%ledger%contact_energy + energy
       self%ledger%external_work = self%ledger%external_work + energy
@@ -257,9 +257,8 @@ contains
          call begin_overclosure(self, scene, step)
          if (state%clock%i_step == 1 .and. .not. (state%clock%time > 0.0_wp &
             .or. step%contact%resolves_overclosure)) then
-            call start_overlap_check(self, scene, error)
+            call start_overlap_check(self, scene, pair_acts(scene%pair, 1), error)
             if (allocated(error)) return
-            if (.not. step_is_dynamic(step)) call start_overlap_of_means(self, scene)
          end if
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return

@@ -15,20 +15,35 @@ module emcon_start_overlap
    use emcon_overlap_query, only : overlap_text
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
+   use emcon_steps, only : step_is_dynamic
    use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : note_add, to_text
    implicit none
    private
-   public :: start_overlap_check, start_overlap_of_means
+   public :: start_overlap_check
 
    !> Mean gaps that begin below 0 by so much of an edge, with no node behind, are told.
    real(wp), parameter :: least_lift = 1.0e-3_wp
 
 contains
 
-   !> Is a body by more in another than its contacts let it, so that the run could not become good?
-   subroutine start_overlap_check(march, scene, error)
+   !> Look at bodies as pairs begin to act that do not resolve an overlap: one is refused, and mean
+   !> gaps below 0 are told where a static step moves the bodies apart by them.
+   subroutine start_overlap_check(march, scene, begins, error)
       type(march_t), intent(inout) :: march      !! at the start of a step
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: begins(:)           !! (n_pair) those that begin to act
+      type(error_t), allocatable, intent(out) :: error   !! bodies overlap
+
+      call refuse_overlap(march, scene, error)
+      if (allocated(error)) return
+      if (.not. step_is_dynamic(scene%step(march%state%clock%i_step))) call tell_means(march, &
+         scene, begins)
+   end subroutine start_overlap_check
+
+   !> Is a body by more in another than its contacts let it, so that the run could not become good?
+   subroutine refuse_overlap(march, scene, error)
+      type(march_t), intent(inout) :: march
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(overlap_t) :: overlap
@@ -68,20 +83,21 @@ contains
             title // " overlap " // when // " by " // to_text(overlap%depth, 3) // " of an edge: " &
             // text // cure)
       end associate
-   end subroutine start_overlap_check
+   end subroutine refuse_overlap
 
    !> Mean gaps over curved faces may begin below 0 with no node behind a surface; a static step
    !> moves the bodies apart by that. Source: docs/theory.md, section 4.4.
-   subroutine start_overlap_of_means(march, scene)
+   subroutine tell_means(march, scene, begins)
       type(march_t), intent(inout) :: march
       type(scene_t), intent(in) :: scene
+      logical, intent(in) :: begins(:)           !! (n_pair)
       real(wp) :: depth, length
       integer :: i
 
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i), contact => march%system%contact(i)%contact)
             if (pair%formulation == formulation_nts .or. pair%formulation == formulation_user &
-               .or. pair%slack > 0.0_wp .or. contact%step%is_idle) cycle
+               .or. pair%slack > 0.0_wp .or. .not. begins(i)) cycle
             call pair_search(march%system, i, motion_of(evaluation_at_end, scene%x, march%state%u, &
                at_rest(march%state%u)))
             call pair_measure(march%system, i, scene%x, march%state%u, at_rest(march%state%u))
@@ -96,7 +112,7 @@ contains
                "SURFACE")
          end associate
       end do
-   end subroutine start_overlap_of_means
+   end subroutine tell_means
 
    !> How far the gap that is closed farthest by its size is, and that size; 0 and 1: none is.
    pure subroutine deepest_of(state, depth, length)

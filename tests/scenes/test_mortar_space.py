@@ -203,8 +203,13 @@ def test_pressure_by_the_overclosure(is_whole: bool, tmp_path: Path) -> None:
     assert abs(run.history["pair1_force_z"][-1]) == pytest.approx(0.02/(2/1000 + 1/500), rel=2.0e-3)
 
 
+#: Of the pair, from a step on.
+CHANGE = "*MODEL CHANGE, TYPE=CONTACT PAIR, {}\nS1, S2\n"
+
+
 def test_a_soft_cap_that_touches_stores_nothing(tmp_path: Path) -> None:
-    """A cap on a plate: its mean gap is below 0 where its node touches. Nothing moves it, and static steps warn of it."""
+    """A cap on a plate: its mean gap is below 0 where its node touches. Nothing moves it, also not as a later step takes
+    the pair in, and static steps warn of it."""
     blocks = [Block("C3D20", (2, 2, 1), size=(2.0, 2.0, 1.0),
                     place=lambda x: x - 1.0 + np.outer(0.1*((x[:, :2] - 1.0)**2).sum(1) + 1.0, [0.0, 0.0, 1.0])),
               Block("C3D8", (1, 1, 1), size=(4.0, 4.0, 1.0), place=lambda x: x - np.array([2.0, 2.0, 1.0]))]
@@ -213,6 +218,10 @@ def test_a_soft_cap_that_touches_stores_nothing(tmp_path: Path) -> None:
     (tmp_path/"free").mkdir()
     run = ran(tmp_path/"free", mesh + pair(MORTAR, soft) + dynamic(0.05, 0.5))
     assert run.history["contact_energy"].max() == run.history["kinetic"].max() == 0.0
+    (tmp_path/"later").mkdir()
+    later = ran(tmp_path/"later", mesh + pair(MORTAR, soft) + dynamic(0.05, 0.1, CHANGE.format("REMOVE"))
+                + dynamic(0.05, 0.2, CHANGE.format("ADD")))
+    assert later.history["contact_energy"].max() == later.history["kinetic"].max() == 0.0
     n = [len(block.x) for block in blocks]
     held = (f"*NSET, NSET=TOP\n{', '.join(str(k) for k in blocks[0].on(2, 1))}\n*NSET, NSET=PLATE, GENERATE\n"
             f"{n[0] + 1}, {sum(n)}\n*STEP, NLGEOM\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\nPLATE, 1, 3\nTOP, 1, 2\nTOP, 3, 3, -.02\n"
