@@ -19,17 +19,12 @@ contains
       real(dp) :: part(pieces(size(a)))
       integer :: k
 
-      if (is_shared(n_thread, size(a))) then
-         !$omp parallel do default(none) shared(part, a, b) num_threads(n_thread) schedule(static)
-         do k = 1, size(part)
-            part(k) = product_of(a(first(k):last(k, size(a))), b(first(k):last(k, size(a))))
-         end do
-         !$omp end parallel do
-      else
-         do k = 1, size(part)
-            part(k) = product_of(a(first(k):last(k, size(a))), b(first(k):last(k, size(a))))
-         end do
-      end if
+      !$omp parallel do default(none) shared(part, a, b) num_threads(n_thread) schedule(static) &
+      !$omp& if(is_shared(n_thread, size(a)))
+      do k = 1, size(part)
+         part(k) = product_of(a(first(k):last(k, size(a))), b(first(k):last(k, size(a))))
+      end do
+      !$omp end parallel do
       total = 0.0_dp
       do k = 1, size(part)
          total = total + part(k)
@@ -44,11 +39,8 @@ contains
       real(dp), intent(inout), contiguous :: y(:)
       integer :: i
 
-      if (.not. is_shared(n_thread, size(x))) then
-         y = y + s*x
-         return
-      end if
-      !$omp parallel do simd default(none) shared(s, x, y) num_threads(n_thread) schedule(static)
+      !$omp parallel do simd default(none) shared(s, x, y) num_threads(n_thread) schedule(static) &
+      !$omp& if(parallel: is_shared(n_thread, size(x)))
       do i = 1, size(x)
          y(i) = y(i) + s*x(i)
       end do
@@ -63,11 +55,8 @@ contains
       real(dp), intent(inout), contiguous :: y(:)
       integer :: i
 
-      if (.not. is_shared(n_thread, size(x))) then
-         y = x + s*y
-         return
-      end if
-      !$omp parallel do simd default(none) shared(s, x, y) num_threads(n_thread) schedule(static)
+      !$omp parallel do simd default(none) shared(s, x, y) num_threads(n_thread) schedule(static) &
+      !$omp& if(parallel: is_shared(n_thread, size(x)))
       do i = 1, size(x)
          y(i) = x(i) + s*y(i)
       end do
@@ -82,11 +71,8 @@ contains
       real(dp), intent(inout), contiguous :: y(:)        !! (n)
       integer :: i
 
-      if (.not. is_shared(n_thread, size(y))) then
-         y = x(place)
-         return
-      end if
-      !$omp parallel do default(none) shared(x, place, y) num_threads(n_thread) schedule(static)
+      !$omp parallel do default(none) shared(x, place, y) num_threads(n_thread) schedule(static) &
+      !$omp& if(is_shared(n_thread, size(y)))
       do i = 1, size(y)
          y(i) = x(place(i))
       end do
@@ -101,11 +87,8 @@ contains
       real(dp), intent(inout), contiguous :: y(:)
       integer :: i
 
-      if (.not. is_shared(n_thread, size(x))) then
-         y(place) = x
-         return
-      end if
-      !$omp parallel do default(none) shared(x, place, y) num_threads(n_thread) schedule(static)
+      !$omp parallel do default(none) shared(x, place, y) num_threads(n_thread) schedule(static) &
+      !$omp& if(is_shared(n_thread, size(x)))
       do i = 1, size(x)
          y(place(i)) = x(i)
       end do
