@@ -9,7 +9,7 @@ module emcon_mortar_rise_space
    use emcon_mortar_faces_space, only : mortar_faces_t
    use emcon_patch_look_space, only : place_vertices
    use emcon_patch_sides_space, only : patch_triangles_t
-   use emcon_patch_stencil_space, only : patch_stencil_gather
+   use emcon_patch_stencil_space, only : patch_stencil_place
    use emcon_polygon_clip_space, only : barycentric, most_corners, polygon_clip
    use emcon_rotation, only : cross_product
    implicit none
@@ -54,7 +54,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: rise(3)           !! [L^3]
       real(wp), intent(out) :: cover(3)          !! [L^2]
-      real(wp), dimension(3, 3 + faces%stencil(t)%patch%n_vertex) :: at, way
+      real(wp) :: at(3, 3 + faces%stencil(t)%patch%n_vertex)
       real(wp) :: place(3, faces%stencil(t)%patch%n_vertex), polygon(2, most_corners), size_of
       type(below_t) :: below
       integer :: i, k, n
@@ -63,7 +63,7 @@ contains
       cover = 0.0_wp
       associate (stencil => faces%stencil(t))
          if (stencil%triangle == 0) return
-         call patch_stencil_gather(stencil, x, u, 0.0_wp*u, at, way)
+         call patch_stencil_place(stencil, x, u, at)
          call place_vertices(stencil%patch, at, place)
          size_of = frame_size(at(:, :3))
          do k = 1, stencil%patch%n_triangle

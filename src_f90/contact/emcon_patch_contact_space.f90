@@ -30,7 +30,7 @@ module emcon_patch_contact_space
    use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
       patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_choose, &
-      patch_stencil_gather, patch_stencil_height, patch_stencil_t
+      patch_stencil_gather, patch_stencil_height, patch_stencil_place, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
@@ -239,7 +239,8 @@ contains
 
       sagitta = 0.0_wp
       if (self%stencil(i)%triangle == 0) return
-      call patch_stencil_gather(self%stencil(i), x, u0, 0.0_wp*u0, at, way)
+      call patch_stencil_place(self%stencil(i), x, u0, at)
+      way = 0.0_wp
       look = patch_look(self%stencil(i)%patch, at, way)
       if (look%cover(0) > no_cover) sagitta = look%height(0)/look%cover(0) &
          - (patch_stencil_height(self%stencil(i), self%sides, self%bulges, x, u0) &

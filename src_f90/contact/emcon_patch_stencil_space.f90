@@ -19,8 +19,8 @@ module emcon_patch_stencil_space
    use emcon_sort, only : unique_sorted
    implicit none
    private
-   public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather, patch_stencil_height, &
-      patch_stencil_begin
+   public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather, patch_stencil_place, &
+      patch_stencil_height, patch_stencil_begin
 
    !> Sides of the patch, by the shorter of the facets of both sides.
    real(wp), parameter :: patch_size = 0.07_wp
@@ -110,12 +110,12 @@ contains
       type(patch_stencil_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
       logical, intent(in) :: is_chosen           !! they were; else nothing is kept
-      real(wp), dimension(3, 3 + self%patch%n_vertex) :: at, way
+      real(wp) :: at(3, 3 + self%patch%n_vertex)
 
       if (self%triangle == 0) return
       if (is_chosen .and. .not. allocated(self%patch%start)) then
          allocate(self%patch%start)
-         call patch_stencil_gather(self, x, u0, u0, at, way)
+         call patch_stencil_place(self, x, u0, at)
          call patch_begin(self%patch, at, self%patch%start)
       else if (allocated(self%patch%start) .and. .not. is_chosen) then
          deallocate(self%patch%start)
@@ -591,27 +591,50 @@ contains
       type(patch_stencil_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) [L]
-      real(wp), dimension(3, self%n_node) :: from, motion
-      integer :: i, j, k
+      real(wp) :: motion(3, self%n_node)
+      integer :: i
+
+      call patch_stencil_place(self, x, u0, at)
+      do i = 2, self%n_node
+         motion(:, i) = du(:, self%node(i)) - du(:, self%node(1))
+      end do
+      call combine(self, motion, way)
+   end subroutine patch_stencil_gather
+
+   !> Where they are.
+   pure subroutine patch_stencil_place(self, x, u, at)
+      type(patch_stencil_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp), intent(out) :: at(:, :)              !! (3, 3 + n_vertex) [L]
+      real(wp) :: from(3, self%n_node)
+      integer :: i
 
       associate (slave => self%node(1))
          do i = 2, self%n_node
-            from(:, i) = (x(:, self%node(i)) - x(:, slave)) + (u0(:, self%node(i)) - u0(:, slave))
-            motion(:, i) = du(:, self%node(i)) - du(:, slave)
-            if (self%flip(i) == 0) cycle
-            from(:, i) = flip_signs(self%flip(i))*from(:, i)
-            motion(:, i) = flip_signs(self%flip(i))*motion(:, i)
+            from(:, i) = (x(:, self%node(i)) - x(:, slave)) + (u(:, self%node(i)) - u(:, slave))
          end do
       end associate
-      at = 0.0_wp
-      way = 0.0_wp
+      call combine(self, from, at)
+   end subroutine patch_stencil_place
+
+   !> Origin, vectors and vertices of what nodes have, mirrored where they are.
+   pure subroutine combine(self, of_node, at)
+      type(patch_stencil_t), intent(in) :: self
+      real(wp), intent(inout) :: of_node(:, :)   !! (3, n_node) from the slave node on; not of that
+      real(wp), intent(out) :: at(:, :)          !! (3, 3 + n_vertex)
+      integer :: i, j, k
+
+      do i = 2, self%n_node
+         if (self%flip(i) /= 0) of_node(:, i) = flip_signs(self%flip(i))*of_node(:, i)
+      end do
+      at(:, 1) = 0.0_wp
       do j = 1, 2 + self%patch%n_vertex
+         at(:, 1 + j) = 0.0_wp
          do k = self%start(j) + 1, self%start(j + 1)
-            at(:, 1 + j) = at(:, 1 + j) + self%entry(k)*from(:, self%row(k))
-            way(:, 1 + j) = way(:, 1 + j) + self%entry(k)*motion(:, self%row(k))
+            at(:, 1 + j) = at(:, 1 + j) + self%entry(k)*of_node(:, self%row(k))
          end do
       end do
-   end subroutine patch_stencil_gather
+   end subroutine combine
 
    !> How far the contact point of a stencil is from the curved surface that the nearest triangle
    !> stands for, > 0 in front of it.
@@ -620,8 +643,7 @@ contains
       type(patch_sides_t), intent(in) :: sides
       type(bulges_t), intent(in) :: bulges       !! of the master
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp), dimension(3, 3 + self%patch%n_vertex) :: at, way
-      real(wp) :: corner(3, 3), origin(3)
+      real(wp) :: at(3, 3 + self%patch%n_vertex), corner(3, 3), origin(3)
       type(nearest_t) :: nearest
       integer :: k
 
@@ -636,7 +658,7 @@ contains
             self%node(1), x, u) - origin
       end do
       call nearest_update(nearest, self%triangle, [0.0_wp, 0.0_wp, 0.0_wp], corner)
-      call patch_stencil_gather(self, x, u, 0.0_wp*u, at, way)
+      call patch_stencil_place(self, x, u, at)
       height = sign(sqrt(nearest%square), dot_product(matmul(corner, nearest%weight), &
          cross_product(at(:, 2), at(:, 3)))) &
          - bulges_rise(bulges, sides%triangles%split, self%triangle, nearest%weight)
