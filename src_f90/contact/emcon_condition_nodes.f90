@@ -1,3 +1,4 @@
+! build: elements
 !> Room for the nodes of a condition and its derivatives.
 module emcon_condition_nodes
    use emcon_constraint, only : condition_t

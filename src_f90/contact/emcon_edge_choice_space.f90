@@ -1,3 +1,4 @@
+! build: elements
 !> Which edges of two surfaces in space cross each other in a step.
 !>
 !> Each side of faces has a few places for crossings with edges of the other surface: sharp sides

@@ -1,3 +1,4 @@
+! build: elements
 !> Contact of edges in space: edges of two bodies that cross, with no node in front of a face.
 !>
 !> Which edge a side of faces crosses is chosen once per step (`emcon_edge_choice_space`); here is

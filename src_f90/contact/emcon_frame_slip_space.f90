@@ -1,3 +1,4 @@
+! build: elements
 !> Slip of a point over the plane of a frame of two vectors in space over a step: two numbers.
 !>
 !> The changes of its affine coordinates, times the vectors of the frame at a place in the step.

@@ -1,3 +1,4 @@
+! build: elements
 !> Where a point is in a frame of two vectors: its affine coordinates and its height, over a step.
 !>
 !> Source: docs/theory.md, section 2 and eq. (43).

@@ -1,3 +1,4 @@
+! build: elements
 !> Slip of mortar contact in space over a step: how slave facets go over what they cover, in the
 !> mean with the weight of each of their vertices.
 !>

@@ -1,3 +1,4 @@
+! build: elements
 !> Mortar contact in space: gaps between slave facets and what of the master they face, integrated
 !> with one weight for each vertex of the slave facets.
 !>

@@ -19,19 +19,22 @@ contains
       real(wp), intent(in) :: factor             !! of what is added
       integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
       real(wp), intent(inout) :: of_node(:, :)   !! (n_dim, any)
-      real(wp) :: full(size(of_node, 1), size(weight, 1))
-      integer :: i, j
+      real(wp) :: full(size(of_node, 1)*size(weight, 1))
+      integer :: a, i, j
 
       full = 0.0_wp
       associate (n_dim => size(of_node, 1))
          do j = 1, size(weight, 2)
             do i = 1, size(weight, 1)
-               if (abs(weight(i, j)) > 0.0_wp) full(:, i) = full(:, i) &
-                  + weight(i, j)*part(n_dim*(j - 1) + 1:n_dim*j)
+               if (.not. abs(weight(i, j)) > 0.0_wp) cycle
+               do a = 1, n_dim
+                  full(n_dim*(i - 1) + a) = full(n_dim*(i - 1) + a) &
+                     + weight(i, j)*part(n_dim*(j - 1) + a)
+               end do
             end do
          end do
       end associate
-      call nodes_add_first(factor, reshape(full, [size(full)]), place, of_node)
+      call nodes_add_first(factor, full, place, of_node)
    end subroutine node_sums_first
 
    !> The same of second derivatives.

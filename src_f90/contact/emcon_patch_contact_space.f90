@@ -1,3 +1,4 @@
+! build: elements
 !> Contact of nodes in space: one constraint per frame of a slave node, the gap of a small patch
 !> around it. A node of a smooth surface has one frame, one of a corner has several.
 !>
@@ -407,17 +408,17 @@ contains
       type(patch_gap_t) :: gap
       type(patch_spread_t) :: spread
       logical :: is_used(self%stencil(i)%n_node)
-      integer :: k
+      integer, dimension(self%stencil(i)%n_node) :: used, order
 
       associate (stencil => self%stencil(i))
          call patch_stencil_gather(stencil, x, u0, du, at, way)
          call patch_gap(stencil%patch, at, way, target, item%leaves_second, gap)
          is_used = patch_uses(stencil, gap%vertex)
-         if (item%has_friction) is_used = is_used .or. [(any(abs(stencil%weight(k, &
-            2 + stencil%corner)) > 0.0_wp), k = 1, stencil%n_node)]
+         if (item%has_friction) call use_corners(stencil, is_used)
          call condition_resize(item, count(is_used), size(x, 1))
+         call list_used(is_used, used, order)
          associate (n => item%n_node, n_var => size(x, 1)*item%n_node)
-            item%node(:n) = pack(stencil%node(:stencil%n_node), is_used)
+            item%node(:n) = stencil%node(used(:n))
             item%n_slave = stencil%n_slave
             item%size = stencil%size
             item%is_mean = .true.
@@ -428,14 +429,43 @@ contains
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
             call patch_spread_list(stencil, gap%vertex, is_used, spread)
-            call patch_spread(gap, spread, self%scale(i), [(k, k = 1, n)], item)
-            if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
-               is_used(2:)), at, way, slip_place(self%step), item)
+            call patch_spread(gap, spread, self%scale(i), order(:n), item)
+            if (item%has_friction) call add_slip(stencil, used(2:n), at, way, &
+               slip_place(self%step), item)
             if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &
-               pack(stencil%flip(:stencil%n_node), is_used))
+               stencil%flip(used(:n)))
          end associate
       end associate
    end subroutine evaluate_frame
+
+   !> The nodes at the corners of the nearest triangle, over which slip is counted, are used too.
+   pure subroutine use_corners(stencil, is_used)
+      type(patch_stencil_t), intent(in) :: stencil
+      logical, intent(inout) :: is_used(:)       !! (n_node)
+      integer :: c, k
+
+      do c = 1, size(stencil%corner)
+         do k = 1, size(is_used)
+            is_used(k) = is_used(k) .or. abs(stencil%weight(k, 2 + stencil%corner(c))) > 0.0_wp
+         end do
+      end do
+   end subroutine use_corners
+
+   !> Which places are used, and their numbers among these.
+   pure subroutine list_used(is_used, used, order)
+      logical, intent(in) :: is_used(:)          !! (n)
+      integer, intent(out) :: used(:), order(:)  !! (n) as many as are used count
+      integer :: k, n
+
+      used = 0
+      n = 0
+      do k = 1, size(is_used)
+         order(k) = k
+         if (.not. is_used(k)) cycle
+         n = n + 1
+         used(n) = k
+      end do
+   end subroutine list_used
 
    !> Find the shares of slip of a stencil for its step, once.
    pure subroutine find_shares(stencil, x, u0)
@@ -472,11 +502,12 @@ contains
    end function slip_corner
 
    !> Slip over a triangle.
-   pure type(frame_slip_t) function slip_over(corner, at, way, at_part, leaves_second) result(slip)
+   pure subroutine slip_over(corner, at, way, at_part, leaves_second, slip)
       integer, intent(in) :: corner(3)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
       real(wp), intent(in) :: at_part            !! of `slip_place`
       logical, intent(in) :: leaves_second
+      type(frame_slip_t), intent(out) :: slip
 
       ! The point is where the stencil counts from. Its own frame tells directions, so that these
       ! turn with it, and not from triangle to triangle.
@@ -484,7 +515,7 @@ contains
          call frame_slip(at(:, place), way(:, place), slip_axis_t(at(:, 2) + at_part*way(:, 2), &
             at_part), leaves_second, slip)
       end associate
-   end function slip_over
+   end subroutine slip_over
 
    !> Slip with its derivatives.
    pure subroutine add_slip(stencil, row, at, way, at_part, item)
@@ -494,7 +525,7 @@ contains
       real(wp), intent(in) :: at_part            !! of `slip_place`
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
-      real(wp) :: weight(size(row), 3), along(size(row), 1)
+      real(wp) :: weight(size(row), 3), along(size(row), 1), by(3)
       integer :: place(1 + size(row)), corner(3), i, k, n, s
 
       call condition_resize_slip(item)
@@ -502,17 +533,17 @@ contains
       do k = 1, size(stencil%patch%slip_share)
          if (.not. stencil%patch%slip_share(k) > 0.0_wp) cycle
          corner = slip_corner(stencil, k)
-         slip = slip_over(corner, at, way, at_part, item%leaves_second)
+         call slip_over(corner, at, way, at_part, item%leaves_second, slip)
          ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
          n = 0
          do i = 1, size(row)
-            associate (by => stencil%weight(row(i), 2 + corner))
-               if (.not. any(abs([by, at_part*stencil%weight(row(i), 1)]) > 0.0_wp)) cycle
-               n = n + 1
-               place(1 + n) = 1 + i
-               weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
-               along(n, 1) = stencil%weight(row(i), 1)
-            end associate
+            by = stencil%weight(row(i), 2 + corner)
+            if (.not. (any(abs(by) > 0.0_wp) .or. &
+               abs(at_part*stencil%weight(row(i), 1)) > 0.0_wp)) cycle
+            n = n + 1
+            place(1 + n) = 1 + i
+            weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
+            along(n, 1) = stencil%weight(row(i), 1)
          end do
          associate (share => stencil%patch%slip_share(k), to => place(:1 + n))
             do s = 1, size(slip%f)
@@ -551,7 +582,8 @@ contains
       end if
       do k = 1, size(share)
          if (.not. share(k) > 0.0_wp) cycle
-         over = slip_over(slip_corner(self%stencil(i), k), at, way, slip_place(self%step), .true.)
+         call slip_over(slip_corner(self%stencil(i), k), at, way, slip_place(self%step), .true., &
+            over)
          slip = slip + share(k)*over%f
       end do
    end function patch_slip

@@ -1,3 +1,4 @@
+! build: elements
 !> Contact of nodes in space with a wall: one constraint per node and per virtual centre of a facet
 !> with nodes between corners, its gap the distance from the shape itself. Source: docs/theory.md,
 !> section 14.1.

@@ -1,3 +1,4 @@
+! build: elements
 !> How far a node is from a wall over a step: value, discrete gradient, second derivatives.
 !>
 !> All of it is made of dot products of the way from the origin of the wall and of its vectors,

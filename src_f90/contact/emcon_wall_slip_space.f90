@@ -1,3 +1,4 @@
+! build: elements
 !> Slip of a point along a wall in space over a step: two numbers.
 !>
 !> The point in the vectors of the wall is three dot products; their changes along two directions

@@ -1,3 +1,4 @@
+! build: elements
 !> From derivatives by the coordinates of all nodes but the first to those by all.
 !>
 !> What is made of differences of positions does not change if all move alike: its derivatives by

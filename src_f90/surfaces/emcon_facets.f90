@@ -224,7 +224,7 @@ contains
       integer, intent(in) :: f                   !! 1 to n_facet
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (n_dim, n_node of the scene) [L]
       real(wp) :: normal(size(x, 1))             !! [L^(n_dim - 1)]
-      real(wp), dimension(size(x, 1)) :: a, b
+      real(wp) :: a(3), b(3)
       integer :: k
 
       a = vector(2)
@@ -244,10 +244,14 @@ contains
       !> From the first node of the facet to its node `k`, differences first.
       pure function vector(k)
          integer, intent(in) :: k
-         real(wp) :: vector(size(x, 1))
+         real(wp) :: vector(3)
+         integer :: i
 
+         vector = 0.0_wp
          associate (first => self%facet(1, f), node => self%facet(k, f))
-            vector = (x(:, node) - x(:, first)) + (u(:, node) - u(:, first))
+            do i = 1, size(x, 1)
+               vector(i) = (x(i, node) - x(i, first)) + (u(i, node) - u(i, first))
+            end do
          end associate
       end function vector
 

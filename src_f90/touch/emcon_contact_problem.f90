@@ -233,9 +233,8 @@ contains
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: by(0:, 0:, :)          !! as of `contact_problem_map`
       real(dp), intent(out) :: slope(:, :)           !! of `defect` by y, as W
-      real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu)), own(0:self%n_slip)
-      real(wp) :: stiffness(size(self%mu))
-      integer :: i, j, k, m
+      real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu)), own, stiffness(size(self%mu))
+      integer :: a, i, j, k, m
 
       m = 1 + self%n_slip
       do i = 1, size(self%mu)
@@ -248,11 +247,13 @@ contains
       do j = 1, size(slope, 2)
          do i = 1, size(self%mu)
             associate (row => m*(i - 1) + 1)
-               own = gain(:, 0, i)*self%w(row, j)
-               do k = 1, self%n_slip
-                  own = own + gain(:, k, i)*self%w(row + k, j)
+               do a = 0, self%n_slip
+                  own = gain(a, 0, i)*self%w(row, j)
+                  do k = 1, self%n_slip
+                     own = own + gain(a, k, i)*self%w(row + k, j)
+                  end do
+                  slope(row + a, j) = real(own, dp)
                end do
-               slope(row:m*i, j) = real(own, dp)
             end associate
          end do
       end do
