@@ -11,7 +11,7 @@ module emcon_mortar_slip_space
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_t
    use emcon_mortar_slave_space, only : mortar_slave_weight
-   use emcon_node_sums, only : node_sums_first, node_sums_second
+   use emcon_node_sums, only : node_sums_second
    use emcon_patch_look_space, only : patch_cells
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
    implicit none
@@ -39,9 +39,10 @@ module emcon_mortar_slip_space
    !> their origins to points of the slave by weights.
    type :: slip_cells_t
       integer :: n = 0
+      real(wp) :: total = 0.0_wp                 !! of what is covered, with its weight [L^2]
       integer, allocatable :: point(:, :)        !! (3, >= n)
       real(wp), allocatable :: at(:, :, :), way(:, :, :)   !! (3, 4, >= n) as `frame_slip` [L]
-      real(wp), allocatable :: weight(:, :, :)   !! (3, n_node, >= n) of nodes in these vectors
+      real(wp), allocatable :: weight(:, :, :)   !! (n_node, 3, >= n) of nodes in these vectors
    end type slip_cells_t
 
 contains
@@ -191,23 +192,42 @@ contains
 
    !> Add the cells of place `k` of a constraint, as triangle `t` of the slave sees them, to those
    !> of the places before it: of one triangle of the master the ways to all points of the slave
-   !> are summed up, as slip is linear in them.
+   !> are summed up, as slip is linear in them. `end_cells` divides by the total.
    pure subroutine add_cells(cells, self, stencil, sight, moment, node)
       type(slip_cells_t), intent(inout) :: cells
       type(mortar_slip_t), intent(in) :: self
       type(patch_stencil_t), intent(in) :: stencil
       type(slip_sight_t), intent(in) :: sight
-      real(wp), intent(in) :: moment(:, :)       !! (3, n_cell) of `moments_of`, by the total
+      real(wp), intent(in) :: moment(:, :)       !! (3, n_cell) of `moments_of`
       integer, intent(in) :: node(:)             !! (n_node) of the condition; none: no weights
+      real(wp) :: part(3), own
       integer :: c, j, place(stencil%n_node)
 
       place = 0
-      if (size(node) > 0) place = [(findloc(node, stencil%node(j), 1), j = 1, stencil%n_node)]
+      if (size(node) > 0) then
+         do j = 1, stencil%n_node
+            place(j) = findloc(node, stencil%node(j), 1)
+         end do
+      end if
       do c = 1, size(moment, 2)
-         call add_cell(cells, self, stencil, sight, place, c, [moment(2:, c) &
-            - sum(moment(:, c))/3.0_wp, -sum(moment(:, c))])
+         own = moment(1, c) + moment(2, c) + moment(3, c)
+         part(:2) = moment(2:, c) - own/3.0_wp
+         part(3) = -own
+         call add_cell(cells, self, stencil, sight, place, c, part)
+         cells%total = cells%total + own
       end do
    end subroutine add_cells
+
+   !> Ways by the total; no cells if there is none.
+   pure subroutine end_cells(cells)
+      type(slip_cells_t), intent(inout) :: cells
+
+      if (.not. cells%total > 0.0_wp) cells%n = 0
+      if (cells%n == 0) return
+      cells%at(:, 4, :) = cells%at(:, 4, :)/cells%total
+      cells%way(:, 4, :) = cells%way(:, 4, :)/cells%total
+      cells%weight(:, 3, :) = cells%weight(:, 3, :)/cells%total
+   end subroutine end_cells
 
    !> Add cell `c` of a triangle of the slave.
    pure subroutine add_cell(cells, self, stencil, sight, place, c, part)
@@ -220,7 +240,6 @@ contains
       !> Of both vectors of the slave's triangle, from whose middle ways count, and of the first
       !> corner of the master's
       real(wp), intent(in) :: part(3)
-      real(wp) :: own(3)
       integer :: l, m, column(3)
       logical :: is_new
 
@@ -236,26 +255,41 @@ contains
       associate (v => self%vertex(:, c), at => cells%at(:, :, m), way => cells%way(:, :, m), &
             weight => cells%weight(:, :, m))
          column = [1, 2, 2 + v(1)]
-         if (is_new) then
-            at(:, 2:3) = sight%at(:, 3 + v(2:)) - spread(sight%at(:, 3 + v(1)), 2, 2)
-            way(:, 2:3) = sight%way(:, 3 + v(2:)) - spread(sight%way(:, 3 + v(1)), 2, 2)
-         end if
          do l = 1, 3
+            if (is_new .and. l > 1) then
+               at(:, l) = sight%at(:, 3 + v(l)) - sight%at(:, 3 + v(1))
+               way(:, l) = sight%way(:, 3 + v(l)) - sight%way(:, 3 + v(1))
+            end if
             at(:, 4) = at(:, 4) + part(l)*sight%at(:, 1 + column(l))
             way(:, 4) = way(:, 4) + part(l)*sight%way(:, 1 + column(l))
          end do
-         if (size(weight, 2) == 0) return
-         do l = 2, stencil%n_node
-            own(3) = dot_product(part, stencil%weight(l, column))
-            own(:2) = 0.0_wp
-            if (is_new) own(:2) = stencil%weight(l, 2 + v(2:)) - stencil%weight(l, 2 + v(1))
-            if (all(abs(own) <= 0.0_wp)) cycle
-            ! Ways count from the first node of a stencil.
-            weight(:, place(l)) = weight(:, place(l)) + own
-            weight(:, place(1)) = weight(:, place(1)) - own
+         if (size(weight, 1) == 0) return
+         if (is_new) then
+            call add_weight(1.0_wp, stencil%weight(:, 2 + v(2)), place, weight(:, 1))
+            call add_weight(1.0_wp, stencil%weight(:, 2 + v(3)), place, weight(:, 2))
+            call add_weight(-1.0_wp, stencil%weight(:, 2 + v(1)), place, weight(:, 1))
+            call add_weight(-1.0_wp, stencil%weight(:, 2 + v(1)), place, weight(:, 2))
+         end if
+         do l = 1, 3
+            call add_weight(part(l), stencil%weight(:, column(l)), place, weight(:, 3))
          end do
       end associate
    end subroutine add_cell
+
+   !> Add a part of the weights of a stencil's nodes; ways count from its first one.
+   pure subroutine add_weight(part, by, place, weight)
+      real(wp), intent(in) :: part
+      real(wp), intent(in) :: by(:)              !! of the nodes of the stencil
+      integer, intent(in) :: place(:)            !! of these in the condition; 0: none
+      real(wp), intent(inout) :: weight(:)       !! (n_node) of the condition
+      integer :: l
+
+      do l = 2, size(place)
+         if (.not. abs(by(l)) > 0.0_wp) cycle
+         weight(place(l)) = weight(place(l)) + part*by(l)
+         weight(place(1)) = weight(place(1)) - part*by(l)
+      end do
+   end subroutine add_weight
 
    !> Room for the cells of constraint `i`.
    pure subroutine begin_cells(cells, self, faces, i, n_node)
@@ -270,7 +304,7 @@ contains
          most = most + size(self(faces%triangle(k))%vertex, 2)
       end do
       allocate(cells%point(3, most), source=0)
-      allocate(cells%at(3, 4, most), cells%way(3, 4, most), cells%weight(3, n_node, most), &
+      allocate(cells%at(3, 4, most), cells%way(3, 4, most), cells%weight(n_node, 3, most), &
          source=0.0_wp)
    end subroutine begin_cells
 
@@ -283,23 +317,21 @@ contains
       type(slip_axis_t), intent(in) :: axis
       real(wp) :: slip(most_slips)
       integer, parameter :: no_node(0) = 0
-      real(wp) :: total
       type(slip_sight_t) :: sight
       type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
       integer :: c, k
 
       slip = 0.0_wp
-      total = total_of(self, faces, i)
-      if (.not. total > 0.0_wp) return
       call begin_cells(cells, self, faces, i, 0)
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
             call mortar_slip_sight(self(t), faces%stencil(t), x, u0, du, sight)
-            call add_cells(cells, self(t), faces%stencil(t), sight, moments_of(self, faces, k) &
-               /total, no_node)
+            call add_cells(cells, self(t), faces%stencil(t), sight, moments_of(self, faces, k), &
+               no_node)
          end associate
       end do
+      call end_cells(cells)
       do c = 1, cells%n
          call frame_slip(cells%at(:, :, c), cells%way(:, :, c), axis, .true., cell)
          slip = slip + cell%f
@@ -318,46 +350,65 @@ contains
       type(condition_t), intent(inout) :: item
       type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
-      real(wp) :: total
       integer :: c, k
 
-      total = total_of(self, faces, i)
-      if (.not. total > 0.0_wp) return
       call begin_cells(cells, self, faces, i, item%n_node)
       do k = faces%start(i), faces%start(i + 1) - 1
          associate (t => faces%triangle(k))
             call add_cells(cells, self(t), faces%stencil(t), sight(slot(t)), &
-               moments_of(self, faces, k)/total, item%node(:item%n_node))
+               moments_of(self, faces, k), item%node(:item%n_node))
          end associate
       end do
+      call end_cells(cells)
       do c = 1, cells%n
          call frame_slip(cells%at(:, :, c), cells%way(:, :, c), axis, item%leaves_second, cell)
          call spread_cell(cell, cells%weight(:, :, c), item)
       end do
    end subroutine mortar_slip_add
 
+   !> Add first derivatives by nodes from those by ways.
+   pure subroutine spread_first(part, weight, place, of_node)
+      real(wp), intent(in) :: part(9)            !! by the components of three ways
+      real(wp), intent(in) :: weight(:, :)       !! (n - 1, 3) of nodes in these, from the second on
+      integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
+      real(wp), intent(inout) :: of_node(:, :)   !! (3, any)
+      real(wp) :: own(3), total(3)
+      integer :: j
+
+      total = 0.0_wp
+      do j = 1, size(weight, 1)
+         own = weight(j, 1)*part(:3) + weight(j, 2)*part(4:6) + weight(j, 3)*part(7:)
+         of_node(:, place(1 + j)) = of_node(:, place(1 + j)) + own
+         total = total + own
+      end do
+      of_node(:, place(1)) = of_node(:, place(1)) - total
+   end subroutine spread_first
+
    !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
    !> are 0, so that of the first node says nothing more.
    pure subroutine spread_cell(slip, weight, item)
       type(frame_slip_t), intent(in) :: slip
-      real(wp), intent(in) :: weight(:, :)       !! (3, n_node)
+      real(wp), intent(in) :: weight(:, :)       !! (n_node, 3)
       type(condition_t), intent(inout) :: item
-      logical :: is_used(size(weight, 2))
-      integer :: j, s
+      real(wp) :: own(size(weight, 1), 3)
+      integer :: place(size(weight, 1)), j, n, s
 
-      is_used = any(abs(weight) > 0.0_wp, 1)
-      is_used(1) = .true.
-      associate (place => pack([(j, j = 1, size(is_used))], is_used))
-         associate (own => transpose(weight(:, place(2:))))
-            do s = 1, size(slip%f)
-               item%slip(s) = item%slip(s) + slip%f(s)
-               call node_sums_first(slip%g(:, s), own, 1.0_wp, place, item%t(:, :, s))
-               call node_sums_first(slip%c(:, s), own, 1.0_wp, place, item%t1(:, :, s))
-               if (item%leaves_second) cycle
-               call node_sums_second(slip%h(:, :, s), own, 1.0_wp, place, item%ht(:, :, s))
-            end do
-         end associate
-      end associate
+      n = 1
+      place(1) = 1
+      do j = 2, size(weight, 1)
+         if (.not. any(abs(weight(j, :)) > 0.0_wp)) cycle
+         n = n + 1
+         place(n) = j
+         own(n - 1, :) = weight(j, :)
+      end do
+      do s = 1, size(slip%f)
+         item%slip(s) = item%slip(s) + slip%f(s)
+         call spread_first(slip%g(:, s), own(:n - 1, :), place(:n), item%t(:, :, s))
+         call spread_first(slip%c(:, s), own(:n - 1, :), place(:n), item%t1(:, :, s))
+         if (item%leaves_second) cycle
+         call node_sums_second(slip%h(:, :, s), own(:n - 1, :), 1.0_wp, place(:n), &
+            item%ht(:, :, s))
+      end do
    end subroutine spread_cell
 
 end module emcon_mortar_slip_space

@@ -233,7 +233,8 @@ contains
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: by(0:, 0:, :)          !! as of `contact_problem_map`
       real(dp), intent(out) :: slope(:, :)           !! of `defect` by y, as W
-      real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu)), own, stiffness(size(self%mu))
+      real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu))
+      real(wp), dimension(size(self%mu)) :: own, stiffness
       integer :: a, i, j, k, m
 
       m = 1 + self%n_slip
@@ -245,16 +246,12 @@ contains
          end do
       end do
       do j = 1, size(slope, 2)
-         do i = 1, size(self%mu)
-            associate (row => m*(i - 1) + 1)
-               do a = 0, self%n_slip
-                  own = gain(a, 0, i)*self%w(row, j)
-                  do k = 1, self%n_slip
-                     own = own + gain(a, k, i)*self%w(row + k, j)
-                  end do
-                  slope(row + a, j) = real(own, dp)
-               end do
-            end associate
+         do a = 0, self%n_slip
+            own = gain(a, 0, :)*self%w(1::m, j)
+            do k = 1, self%n_slip
+               own = own + gain(a, k, :)*self%w(1 + k::m, j)
+            end do
+            slope(1 + a::m, j) = real(own, dp)
          end do
       end do
       do i = 1, size(self%mu)
