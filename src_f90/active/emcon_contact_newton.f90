@@ -13,7 +13,7 @@ module emcon_contact_newton
       constraints_take_hold
    use emcon_contact_newton_condense, only : contact_newton_condense, &
       contact_newton_condense_kept, contact_newton_correct
-   use emcon_contact_newton_type, only : contact_newton_t, kept_part_t, rest_t
+   use emcon_contact_newton_type, only : by_kept_t, contact_newton_t, rest_t
    use emcon_contact_problem, only : contact_problem_create
    use emcon_contact_rest, only : contact_rest_defect, contact_rest_missed
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
@@ -191,7 +191,7 @@ contains
          if (i == 0) self%is_searching = self%is_searching .or. self%has_tangent
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
-         if (i == 0 .and. self%kept%is_on) self%kept = kept_part_t(.true., motion%du, set%lam)
+         if (i == 0 .and. self%kept%is_on) self%kept = by_kept_t(.true., motion%du, set%lam)
          if (i > 0 .and. is_done(self, newton)) return
          self%early%is_made = self%early%is_allowed .and. i > 0 &
             .and. self%rest%size <= early_enough
@@ -280,6 +280,7 @@ contains
       motion%du = self%kept%du
       set%lam = self%kept%lam
       self%status = slip_status_t()
+      self%least_soft = 0
       self%rest = rest_t()
       self%step%is_taken = .false.
       self%is_condensed = .false.

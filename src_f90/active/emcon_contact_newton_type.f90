@@ -9,7 +9,7 @@ module emcon_contact_newton_type
    use emcon_mixed_step, only : mixed_step_t
    implicit none
    private
-   public :: contact_newton_t, early_end_t, kept_part_t, rest_t
+   public :: by_kept_t, contact_newton_t, early_end_t, rest_t
 
    !> What is left: relative residual, and what contacts miss.
    type :: rest_t
@@ -28,13 +28,12 @@ module emcon_contact_newton_type
       logical :: goes_on = .false.               !! this one goes on with that
    end type early_end_t
 
-   !> The part of a factor that is kept.
-   type :: kept_part_t
-      logical :: is_on = .false.                 !! corrections come from it
-      ! What it began with:
+   !> Corrections by a factor that is kept.
+   type :: by_kept_t
+      logical :: is_on = .false.                 !! they are made, from here on:
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) motion [L]
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers
-   end type kept_part_t
+   end type by_kept_t
 
    !> One solve, or several one after the other for a step.
    type :: contact_newton_t
@@ -52,7 +51,7 @@ module emcon_contact_newton_type
       type(slip_status_t), allocatable :: status(:)
       type(mixed_step_t) :: step
       type(rest_t) :: rest
-      type(kept_part_t) :: kept
+      type(by_kept_t) :: kept
       logical :: is_rounding = .false.  !! nothing but round-off is left
       integer :: least_soft = 0         !! first of `softer` that is tried, 0: none
       logical :: is_searching = .false. !! no tangent is wanted

@@ -122,9 +122,9 @@ contains
       end do
    end subroutine layer_take_velocities
 
-   !> First guess of the motion: what has no mass goes with the nodes beside it that have. Its own
-   !> velocity is none to go on with: forces that balance over a step in the mean are off by as
-   !> much, and the other way, at its end, so that it is too large and too small in turn.
+   !> First guess of the motion: a node without mass moves as those with mass in its elements, in
+   !> the mean. Its own velocity alternates: forces that balance in the mean of a step are off at its
+   !> end as at its start, with the other sign.
    pure subroutine layer_guess(self, du)
       type(layer_t), intent(in) :: self
       real(wp), intent(inout) :: du(:, :)        !! (n_dim, n_node) over the step [L]

@@ -9,7 +9,7 @@ module emcon_mortar_rise_space
    use emcon_mortar_faces_space, only : mortar_faces_t
    use emcon_patch_look_space, only : place_vertices
    use emcon_patch_sides_space, only : patch_triangles_t
-   use emcon_patch_stencil_space, only : patch_stencil_place
+   use emcon_patch_places_space, only : patch_stencil_place
    use emcon_polygon_clip_space, only : barycentric, most_corners, polygon_clip
    use emcon_rotation, only : cross_product
    implicit none

@@ -11,9 +11,10 @@ module emcon_mortar_slip_space
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_t
    use emcon_mortar_slave_space, only : mortar_slave_weight
-   use emcon_node_sums, only : node_sums_second
+   use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_look_space, only : patch_cells
-   use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
+   use emcon_patch_places_space, only : patch_stencil_gather
+   use emcon_patch_stencil_space, only : patch_stencil_t
    implicit none
    private
    public :: mortar_slip_t, mortar_slip_choose, mortar_slip_shift, mortar_slip_of, &
@@ -366,24 +367,6 @@ contains
       end do
    end subroutine mortar_slip_add
 
-   !> Add first derivatives by nodes from those by ways.
-   pure subroutine spread_first(part, weight, place, of_node)
-      real(wp), intent(in) :: part(9)            !! by the components of three ways
-      real(wp), intent(in) :: weight(:, :)       !! (n - 1, 3) of nodes in these, from the second on
-      integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
-      real(wp), intent(inout) :: of_node(:, :)   !! (3, any)
-      real(wp) :: own(3), total(3)
-      integer :: j
-
-      total = 0.0_wp
-      do j = 1, size(weight, 1)
-         own = weight(j, 1)*part(:3) + weight(j, 2)*part(4:6) + weight(j, 3)*part(7:)
-         of_node(:, place(1 + j)) = of_node(:, place(1 + j)) + own
-         total = total + own
-      end do
-      of_node(:, place(1)) = of_node(:, place(1)) - total
-   end subroutine spread_first
-
    !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
    !> are 0, so that of the first node says nothing more.
    pure subroutine spread_cell(slip, weight, item)
@@ -403,8 +386,8 @@ contains
       end do
       do s = 1, size(slip%f)
          item%slip(s) = item%slip(s) + slip%f(s)
-         call spread_first(slip%g(:, s), own(:n - 1, :), place(:n), item%t(:, :, s))
-         call spread_first(slip%c(:, s), own(:n - 1, :), place(:n), item%t1(:, :, s))
+         call node_sums_first(slip%g(:, s), own(:n - 1, :), 1.0_wp, place(:n), item%t(:, :, s))
+         call node_sums_first(slip%c(:, s), own(:n - 1, :), 1.0_wp, place(:n), item%t1(:, :, s))
          if (item%leaves_second) cycle
          call node_sums_second(slip%h(:, :, s), own(:n - 1, :), 1.0_wp, place(:n), &
             item%ht(:, :, s))

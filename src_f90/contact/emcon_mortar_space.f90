@@ -29,7 +29,7 @@ module emcon_mortar_space
    use emcon_patch_gap_space, only : patch_sums_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
    use emcon_patch_near_space, only : room_beside
-   use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_gather
+   use emcon_patch_places_space, only : patch_stencil_begin, patch_stencil_gather
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
    implicit none

@@ -13,7 +13,8 @@ module emcon_mortar_sum_space
       patch_open_sums, patch_open_t, patch_sums_t
    use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
       patch_uses
-   use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
+   use emcon_patch_places_space, only : patch_stencil_gather
+   use emcon_patch_stencil_space, only : patch_stencil_t
    implicit none
    private
    public :: sight_t, mortar_sight, mortar_facet_sums, mortar_begin_sum, mortar_add_facet

@@ -4,7 +4,7 @@
 !> The sums are of places from the first node on: derivatives by that are minus the sum of the
 !> others.
 module emcon_node_sums
-   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
+   use emcon_dgrad_nodes, only : nodes_add_second
    use emcon_kinds, only : wp
    implicit none
    private
@@ -19,22 +19,21 @@ contains
       real(wp), intent(in) :: factor             !! of what is added
       integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
       real(wp), intent(inout) :: of_node(:, :)   !! (n_dim, any)
-      real(wp) :: full(size(of_node, 1)*size(weight, 1))
-      integer :: a, i, j
+      real(wp), dimension(size(of_node, 1)) :: own, total
+      integer :: i, j
 
-      full = 0.0_wp
+      total = 0.0_wp
       associate (n_dim => size(of_node, 1))
-         do j = 1, size(weight, 2)
-            do i = 1, size(weight, 1)
-               if (.not. abs(weight(i, j)) > 0.0_wp) cycle
-               do a = 1, n_dim
-                  full(n_dim*(i - 1) + a) = full(n_dim*(i - 1) + a) &
-                     + weight(i, j)*part(n_dim*(j - 1) + a)
-               end do
+         do i = 1, size(weight, 1)
+            own = 0.0_wp
+            do j = 1, size(weight, 2)
+               own = own + weight(i, j)*part(n_dim*(j - 1) + 1:n_dim*j)
             end do
+            of_node(:, place(1 + i)) = of_node(:, place(1 + i)) + factor*own
+            total = total + own
          end do
       end associate
-      call nodes_add_first(factor, full, place, of_node)
+      of_node(:, place(1)) = of_node(:, place(1)) - factor*total
    end subroutine node_sums_first
 
    !> The same of second derivatives.

@@ -6,7 +6,7 @@
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 14.
 module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_t
-   use emcon_condition_nodes, only : condition_fold, condition_resize, condition_resize_slip
+   use emcon_condition_nodes, only : condition_fold, condition_resize
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, slip_place
    use emcon_contact_law_registry, only : contact_laws_of_surface
@@ -14,24 +14,24 @@ module emcon_patch_contact_space
    use emcon_facet_split, only : facet_split_init, facet_split_t
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
-   use emcon_frame_slip_space, only : frame_slip, frame_slip_t, slip_axis_t
    use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       interaction_reach, pair_has_order
    use emcon_kinds, only : wp
    use emcon_mirror_faces_space, only : always_rests, mirror_axes
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_node_sums, only : node_sums_across, node_sums_first, node_sums_second
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t
-   use emcon_patch_look_space, only : patch_look, patch_look_t, patch_shares
+   use emcon_patch_look_space, only : patch_look, patch_look_t
    use emcon_patch_meeting_space, only : least_cover, patch_meets
    use emcon_patch_near_space, only : patch_scope_t
+   use emcon_patch_places_space, only : patch_stencil_begin, patch_stencil_gather, &
+      patch_stencil_height, patch_stencil_place
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
+   use emcon_patch_slip_space, only : patch_slip_add, patch_slip_begin, patch_slip_of
    use emcon_patch_spread_space, only : patch_spread, patch_spread_list, patch_spread_t, &
       patch_uses
-   use emcon_patch_stencil_space, only : patch_stencil_begin, patch_stencil_choose, &
-      patch_stencil_gather, patch_stencil_height, patch_stencil_place, patch_stencil_t
+   use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
@@ -391,7 +391,8 @@ contains
       is_chosen = position_memo_holds(self%memo, self%near%node, x, u0)
       do k = 1, size(wanted)
          call patch_stencil_begin(self%stencil(wanted(k)), x, u0, is_chosen)
-         if (item(k)%has_friction) call find_shares(self%stencil(wanted(k)), x, u0)
+         if (item(k)%has_friction) call patch_slip_begin(self%stencil(wanted(k)), &
+            x, u0)
          call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset &
             + self%sagitta(wanted(k)), item(k))
       end do
@@ -408,7 +409,7 @@ contains
       type(patch_gap_t) :: gap
       type(patch_spread_t) :: spread
       logical :: is_used(self%stencil(i)%n_node)
-      integer, dimension(self%stencil(i)%n_node) :: used, order
+      integer :: used(self%stencil(i)%n_node), k
 
       associate (stencil => self%stencil(i))
          call patch_stencil_gather(stencil, x, u0, du, at, way)
@@ -416,7 +417,7 @@ contains
          is_used = patch_uses(stencil, gap%vertex)
          if (item%has_friction) call use_corners(stencil, is_used)
          call condition_resize(item, count(is_used), size(x, 1))
-         call list_used(is_used, used, order)
+         call list_used(is_used, used)
          associate (n => item%n_node, n_var => size(x, 1)*item%n_node)
             item%node(:n) = stencil%node(used(:n))
             item%n_slave = stencil%n_slave
@@ -429,8 +430,8 @@ contains
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
             call patch_spread_list(stencil, gap%vertex, is_used, spread)
-            call patch_spread(gap, spread, self%scale(i), order(:n), item)
-            if (item%has_friction) call add_slip(stencil, used(2:n), at, way, &
+            call patch_spread(gap, spread, self%scale(i), [(k, k = 1, n)], item)
+            if (item%has_friction) call patch_slip_add(stencil, used(2:n), at, way, &
                slip_place(self%step), item)
             if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &
                stencil%flip(used(:n)))
@@ -451,115 +452,20 @@ contains
       end do
    end subroutine use_corners
 
-   !> Which places are used, and their numbers among these.
-   pure subroutine list_used(is_used, used, order)
+   !> Which places are used.
+   pure subroutine list_used(is_used, used)
       logical, intent(in) :: is_used(:)          !! (n)
-      integer, intent(out) :: used(:), order(:)  !! (n) as many as are used count
+      integer, intent(out) :: used(:)            !! (n) those, then 0
       integer :: k, n
 
       used = 0
       n = 0
       do k = 1, size(is_used)
-         order(k) = k
          if (.not. is_used(k)) cycle
          n = n + 1
          used(n) = k
       end do
    end subroutine list_used
-
-   !> Find the shares of slip of a stencil for its step, once.
-   pure subroutine find_shares(stencil, x, u0)
-      type(patch_stencil_t), intent(inout) :: stencil
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
-      real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
-
-      if (allocated(stencil%patch%slip_share)) return
-      call patch_stencil_gather(stencil, x, u0, u0, at, way)
-      stencil%patch%slip_share = slip_shares(stencil, at)
-   end subroutine find_shares
-
-   !> How much of the slip is over each triangle of a patch: what it covers of that as the step
-   !> begins; where nothing is covered, all over the nearest one, which comes last.
-   pure function slip_shares(stencil, at) result(share)
-      type(patch_stencil_t), intent(in) :: stencil
-      real(wp), intent(in) :: at(:, :)           !! (3, 3 + n_vertex) of the stencil [L]
-      real(wp) :: share(stencil%patch%n_triangle + 1)
-
-      associate (n => stencil%patch%n_triangle)
-         share(:n) = patch_shares(stencil%patch, at)
-         share(n + 1) = merge(0.0_wp, 1.0_wp, any(share(:n) > 0.0_wp))
-      end associate
-   end function slip_shares
-
-   !> The vertices of triangle `k` of these.
-   pure function slip_corner(stencil, k) result(corner)
-      type(patch_stencil_t), intent(in) :: stencil
-      integer, intent(in) :: k
-      integer :: corner(3)
-
-      corner = stencil%corner
-      if (k <= stencil%patch%n_triangle) corner = stencil%patch%triangle(:, k)
-   end function slip_corner
-
-   !> Slip over a triangle.
-   pure subroutine slip_over(corner, at, way, at_part, leaves_second, slip)
-      integer, intent(in) :: corner(3)
-      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
-      real(wp), intent(in) :: at_part            !! of `slip_place`
-      logical, intent(in) :: leaves_second
-      type(frame_slip_t), intent(out) :: slip
-
-      ! The point is where the stencil counts from. Its own frame tells directions, so that these
-      ! turn with it, and not from triangle to triangle.
-      associate (place => [3 + corner, 1])
-         call frame_slip(at(:, place), way(:, place), slip_axis_t(at(:, 2) + at_part*way(:, 2), &
-            at_part), leaves_second, slip)
-      end associate
-   end subroutine slip_over
-
-   !> Slip with its derivatives.
-   pure subroutine add_slip(stencil, row, at, way, at_part, item)
-      type(patch_stencil_t), intent(in) :: stencil   !! with its shares of slip
-      integer, intent(in) :: row(:)              !! nodes of the stencil in the condition, but 1
-      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
-      real(wp), intent(in) :: at_part            !! of `slip_place`
-      type(condition_t), intent(inout) :: item   !! with all of these nodes
-      type(frame_slip_t) :: slip
-      real(wp) :: weight(size(row), 3), along(size(row), 1), by(3)
-      integer :: place(1 + size(row)), corner(3), i, k, n, s
-
-      call condition_resize_slip(item)
-      place(1) = 1
-      do k = 1, size(stencil%patch%slip_share)
-         if (.not. stencil%patch%slip_share(k) > 0.0_wp) cycle
-         corner = slip_corner(stencil, k)
-         call slip_over(corner, at, way, at_part, item%leaves_second, slip)
-         ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
-         n = 0
-         do i = 1, size(row)
-            by = stencil%weight(row(i), 2 + corner)
-            if (.not. (any(abs(by) > 0.0_wp) .or. &
-               abs(at_part*stencil%weight(row(i), 1)) > 0.0_wp)) cycle
-            n = n + 1
-            place(1 + n) = 1 + i
-            weight(n, :) = [by(2) - by(1), by(3) - by(1), -by(1)]
-            along(n, 1) = stencil%weight(row(i), 1)
-         end do
-         associate (share => stencil%patch%slip_share(k), to => place(:1 + n))
-            do s = 1, size(slip%f)
-               item%slip(s) = item%slip(s) + share*slip%f(s)
-               call node_sums_first(slip%g(:, s), weight(:n, :), share, to, item%t(:, :, s))
-               call node_sums_first(slip%c(:, s), weight(:n, :), share, to, item%t1(:, :, s))
-               if (at_part > 0.0_wp) call node_sums_first(slip%c_along(:, s), along(:n, :), &
-                  share, to, item%t1(:, :, s))
-               if (item%leaves_second) cycle
-               call node_sums_second(slip%h(:, :, s), weight(:n, :), share, to, item%ht(:, :, s))
-               if (at_part > 0.0_wp) call node_sums_across(slip%h_along(:, :, s), weight(:n, :), &
-                  along(:n, 1), share, to, item%ht(:, :, s))
-            end do
-         end associate
-      end do
-   end subroutine add_slip
 
    !> As `contact_t` has it.
    pure function patch_slip(self, i, x, u0, du) result(slip)
@@ -567,25 +473,8 @@ contains
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp) :: slip(size(x, 1) - 1)           !! [L]
-      real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
-      real(wp) :: share(self%stencil(i)%patch%n_triangle + 1)
-      type(frame_slip_t) :: over
-      integer :: k
 
-      slip = 0.0_wp
-      if (self%stencil(i)%triangle == 0) return
-      call patch_stencil_gather(self%stencil(i), x, u0, du, at, way)
-      if (allocated(self%stencil(i)%patch%slip_share)) then
-         share = self%stencil(i)%patch%slip_share
-      else
-         share = slip_shares(self%stencil(i), at)
-      end if
-      do k = 1, size(share)
-         if (.not. share(k) > 0.0_wp) cycle
-         call slip_over(slip_corner(self%stencil(i), k), at, way, slip_place(self%step), .true., &
-            over)
-         slip = slip + share(k)*over%f
-      end do
+      slip = patch_slip_of(self%stencil(i), x, u0, du, slip_place(self%step))
    end function patch_slip
 
    !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner

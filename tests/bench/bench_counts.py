@@ -21,7 +21,8 @@ import tempfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
 import crowds  # noqa: E402
-from scene_tools import DECKS, ROOT, run_deck  # noqa: E402
+from peers import plate  # noqa: E402
+from scene_tools import DECKS, ROOT, Deck, run_deck  # noqa: E402
 from verification import update  # noqa: E402
 
 STORE = pathlib.Path(__file__).with_name("counts.json")
@@ -42,6 +43,7 @@ SCENES = {
     "strips": {"t_end": 6e-4},
     "strips, MORTAR": {"t_end": 6e-4, "formulation": "MORTAR"},
     "fold": {"t_end": 1, "formulation": "NODE TO SURFACE"},
+    "ball on plate": {},
 }
 #: One pile takes its way by chance: that of a set of contacts, of a factor that is made anew. Five
 #: of them together tell three per cent.
@@ -56,6 +58,8 @@ INCREMENTS = 50
 
 def decks(base):
     """Those that a scene consists of."""
+    if base == "ball on plate":
+        return [Deck(plate.deck(plate.scene(), 0.005, 14), "plate")]
     if base not in crowds.SCENES:
         return [DECKS/f"{base}.inp"]
     make = crowds.SCENES[base]

@@ -2,7 +2,7 @@
 module test_convergence
    use check, only : check_equal, check_near, test_case_t
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
-      convergence_t, next_give_up, next_tangent
+      convergence_t, next_done, next_give_up, next_old_tangent, next_tangent
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    implicit none
@@ -18,7 +18,8 @@ contains
 
       tests = [ &
          test_case_t("forces that fall with their residual", test_falling), &
-         test_case_t("defects that stay while forces fall", test_defects)]
+         test_case_t("defects that stay while forces fall", test_defects), &
+         test_case_t("slow corrections by a kept factor", test_slow)]
    end subroutine collect_convergence
 
    !> Iterations until the end, with a residual that is most of forces that fall each time; and how
@@ -68,5 +69,28 @@ contains
       call run(exp(1.0_wp), 0.8_wp, n, least)
       call check_equal(error, n, 7, "iterations as gaps stay")
    end subroutine test_defects
+
+   !> A kept factor is renewed once for its age; corrections that stay as slow go on to round-off.
+   subroutine test_slow(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(convergence_t) :: convergence
+      real(wp), parameter :: left = 0.4_wp
+      real(wp) :: size
+      integer :: next, n_tangent
+
+      call convergence_init(convergence, 1.0e-10_wp, maximum)
+      call convergence_begin(convergence)
+      convergence%is_kept = .true.
+      size = 1.0e-2_wp
+      n_tangent = 0
+      do
+         call convergence_judge(convergence, size, 0.0_wp, 1.0_wp, .false., next)
+         if (next == next_tangent) n_tangent = n_tangent + 1
+         if (next == next_old_tangent) size = left*size
+         if (next == next_done .or. next == next_give_up) exit
+      end do
+      call check_equal(error, next, next_done, "the end")
+      call check_equal(error, n_tangent, 1, "factors that were renewed")
+   end subroutine test_slow
 
 end module test_convergence
