@@ -123,8 +123,8 @@ contains
    end subroutine layer_take_velocities
 
    !> First guess of the motion: a node without mass moves as those with mass in its elements, in
-   !> the mean. Its own velocity alternates: forces that balance in the mean of a step are off at its
-   !> end as at its start, with the other sign.
+   !> the mean. Its own velocity alternates: forces that balance in the mean of a step are off at
+   !> its end as at its start, with the other sign.
    pure subroutine layer_guess(self, du)
       type(layer_t), intent(in) :: self
       real(wp), intent(inout) :: du(:, :)        !! (n_dim, n_node) over the step [L]

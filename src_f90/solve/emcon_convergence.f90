@@ -179,7 +179,7 @@ contains
       next = next_give_up
       if (.not. size < huge(size) .or. self%n_history > kept_for_tangent*self%maximum) return
       if (is_stalled .and. self%n_renewal > 0) return
-      ! For its age a factor is renewed once: if a new one is as slow, curved contacts are the cause.
+      ! Once for its age: where a new factor is as slow, curved contacts are the cause.
       is_stalled = is_stalled .or. (self%n_kept >= too_old .and. self%n_renewal == 0 &
          .and. self%best > nearly_done)
       next = merge(next_tangent, next_old_tangent, is_stalled)
