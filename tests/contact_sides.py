@@ -6,6 +6,7 @@
 
 import functools
 import pathlib
+import re
 import sys
 
 import numpy as np
@@ -70,6 +71,12 @@ class FileScene:
     @property
     def has_contact(self):
         return has(self.given, "*CONTACT PAIR")
+
+    @property
+    def has_walls(self):
+        """Are there surfaces without nodes, which have one side?"""
+        kinds = re.findall(r"\*SURFACE,.*TYPE=(\w+)", self.given.text().upper())
+        return any(kind not in ("ELEMENT", "NODE") for kind in kinds)
 
     @property
     def is_plane(self):

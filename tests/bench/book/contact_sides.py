@@ -82,6 +82,8 @@ def start(runs):
         given, shorter = formulation(scene.given), SHORTER.get(name, {})
         started[name, f"as given, `{given}`"] = figures(runs, scene, ONE, **shorter)
         for contact, sides, parameters in OTHERS:
+            if sides == BOTH and scene.has_walls:
+                continue
             if sides != ONE or given != NODES:
                 started[name, contact] = figures(runs, scene, sides, **parameters, **shorter)
     return started
