@@ -236,6 +236,11 @@ contains
             call candidates_look(self, system, motion, status, .false.)
             if (status /= step_done) return
             has_looked = has_looked .or. .not. self%candidates%have_changed
+            ! What stops is led there before the step is solved with what it is not led to.
+            leads = .false.
+            if (self%friction%looks_back) call friction_look_back(self%friction, system, self%set, &
+               motion, leads)
+            solve%early%is_made = .not. leads    ! else laws are not those it was solved with
             cycle
          end if
          call keep(self, solve%law)

@@ -1,9 +1,9 @@
 !> Solutions of a problem of contacts along the central path, as primal-dual interior methods go.
 !>
-!> Forces are kept inside of what the law allows: lam > 0, |tau| < mu lam. Gaps g, rates nu of slip
-!> by friction and the room that friction has are unknowns of their own, with products that are to
-!> be e^2 on the path and 0 at its end: c g lam, nu (mu^2 lam^2 - tau^2)/(2 mu^2); c slip = nu tau.
-!> A slip a that is led to adds theta c a with 0 < theta < 1 and tau.a/|a| = over - under, where
+!> Forces are kept inside of what the law allows: lam > 0, |tau| < mu lam. Gaps g, speeds sigma and
+!> the room rho = mu lam - tau^2/(mu lam) that friction has are unknowns of their own, with products
+!> that are to be e^2 on the path and 0 at its end: c g lam, sigma rho/(2 mu^2), where c slip
+!> = sigma tau/(mu lam). As a contact opens sigma tends to the size of c slip. A slip a that is led to adds theta c a with 0 < theta < 1 and tau.a/|a| = over - under, where
 !> over (1 - theta) c |a| and under theta c |a| are e^2. Of forces that follow from others the path
 !> leads to those farthest from limits, however far these are from those before.
 !> Source: docs/theory.md, eq. (14i).
@@ -30,7 +30,7 @@ module emcon_contact_path
    !> path, and again each time that they fall by this.
    real(wp), parameter :: is_late = 1.0e-12_wp, is_later = 1.0e-2_wp
    integer, parameter :: late_trials = 6
-   !> Squares of forces tell room down to this part of that of no friction.
+   !> Forces tell room down to this part of that of no friction.
    real(wp), parameter :: exact_room = 1.0e-9_wp
 
    !> What does not change along a path.
@@ -50,8 +50,8 @@ module emcon_contact_path
       real(wp), allocatable :: lam(:)            !! (n) > 0
       real(wp), allocatable :: tau(:, :)         !! (n_slip, n)
       real(wp), allocatable :: gap(:)            !! (n) > 0
-      real(wp), allocatable :: rate(:)           !! (n) nu > 0 [1]
-      real(wp), allocatable :: room(:)           !! (n) mu^2 lam^2 - tau^2 > 0
+      real(wp), allocatable :: speed(:)          !! (n) sigma > 0
+      real(wp), allocatable :: room(:)           !! (n) rho = mu lam - tau^2/(mu lam) > 0
       real(wp), allocatable :: part(:)           !! (n) theta, 0 < theta < 1 [1]
       real(wp), allocatable :: over(:), under(:) !! (n) > 0
    end type point_t
@@ -133,8 +133,8 @@ contains
          at%lam = spread(path%largest, 1, n)
          at%gap = at%lam
          allocate(at%tau(self%n_slip, n), source=0.0_wp)
-         at%rate = spread(2.0_wp, 1, n)
-         at%room = (path%mu*at%lam)**2
+         at%room = path%mu*at%lam
+         at%speed = 2.0_wp*at%room
          at%part = spread(0.5_wp, 1, n)
          at%over = 2.0_wp*path%largest**2/path%length
          at%under = at%over
@@ -159,8 +159,8 @@ contains
       rest%force(1:, :) = rest%force(1:, :) - at%tau
       do i = 1, size(at%lam)
          rest%motion(0, i) = path%c(i)*rest%motion(0, i) - at%gap(i)
-         rest%motion(1:, i) = -path%c(i)*rest%motion(1:, i) - at%rate(i)*at%tau(:, i) &
-            - at%part(i)*path%target(:, i)
+         rest%motion(1:, i) = -path%c(i)*rest%motion(1:, i) - at%part(i)*path%target(:, i)
+         if (path%rubs(i)) rest%motion(1:, i) = rest%motion(1:, i) - at%speed(i)*use(path, at, i)
          if (path%is_led(i)) rest%along(i) = dot_product(at%tau(:, i), path%target(:, i)) &
             /path%length(i) - (at%over(i) - at%under(i))
       end do
@@ -193,7 +193,7 @@ contains
       at%lam = at%lam + gone*step%lam
       at%tau = at%tau + gone*step%tau
       at%gap = at%gap + gone*step%gap
-      at%rate = at%rate + gone*step%rate
+      at%speed = at%speed + gone*step%speed
       at%room = max(at%room + gone*step%room, (1.0_wp - inside)*at%room)
       call keep_inside(path, at)
       at%part = at%part + gone*step%part
@@ -201,8 +201,18 @@ contains
       at%under = at%under + gone*step%under
    end subroutine advance
 
-   !> Room is that of the forces; where these have turned out of the limit, or squares do not tell
-   !> it, friction is brought back to the room that was foreseen, along its way.
+   !> Friction over its limit.
+   pure function use(path, at, i)
+      type(path_t), intent(in) :: path
+      type(point_t), intent(in) :: at
+      integer, intent(in) :: i
+      real(wp) :: use(size(at%tau, 1))
+
+      use = at%tau(:, i)/(path%mu(i)*at%lam(i))
+   end function use
+
+   !> Room is that of the forces; where these have turned out of the limit, or do not tell it,
+   !> friction is brought back to the room that was foreseen, along its way.
    pure subroutine keep_inside(path, at)
       type(path_t), intent(in) :: path
       type(point_t), intent(inout) :: at
@@ -211,14 +221,14 @@ contains
 
       do i = 1, size(at%lam)
          if (.not. path%rubs(i)) cycle
-         most = (path%mu(i)*at%lam(i))**2
+         most = path%mu(i)*at%lam(i)
          length = norm2(at%tau(:, i))
-         room = most - length**2
+         room = most - length**2/most
          if (room >= max((1.0_wp - inside)*at%room(i), exact_room*most)) then
             at%room(i) = room
          else
             at%room(i) = min(at%room(i), most)
-            at%tau(:, i) = sqrt(most - at%room(i))/length*at%tau(:, i)
+            at%tau(:, i) = sqrt(most*(most - at%room(i)))/length*at%tau(:, i)
          end if
       end do
    end subroutine keep_inside
@@ -232,7 +242,7 @@ contains
       product = 0.0_wp
       do i = 1, size(at%lam)
          product = product + at%lam(i)*at%gap(i)
-         if (path%rubs(i)) product = product + at%rate(i)*at%room(i)/(2.0_wp*path%mu(i)**2)
+         if (path%rubs(i)) product = product + at%speed(i)*at%room(i)/(2.0_wp*path%mu(i)**2)
          if (path%is_led(i)) product = product + path%length(i)*(at%over(i)*(1.0_wp &
             - at%part(i)) + at%under(i)*at%part(i))
       end do
@@ -288,7 +298,7 @@ contains
       type(rest_t), intent(in) :: rest
       integer, intent(in) :: i
       real(wp), intent(out) :: frame(0:, 0:), give(0:, 0:), right(0:, :)
-      real(wp) :: size, by, way(ubound(frame, 1))
+      real(wp) :: share, by, way(ubound(frame, 1))
       integer :: s
 
       associate (tau => at%tau(:, i), lam => at%lam(i), n_slip => ubound(frame, 1))
@@ -299,13 +309,13 @@ contains
          give(0, 0) = at%gap(i)/lam
          right(0, :) = [-at%gap(i) - rest%motion(0, i), 1.0_wp/lam]
          if (path%rubs(i)) then
-            size = norm2(tau)
+            share = norm2(use(path, at, i))
             call find_ways(tau, frame(1:, 1:))
-            by = at%rate(i)/at%room(i)
-            give(1:, 1:) = at%rate(i)*frame(1:, 1:)
-            give(1, 1:) = give(1, 1:) + 2.0_wp*by*size**2*frame(1, 1:)
-            give(1, 0) = -2.0_wp*by*path%mu(i)**2*lam*size
-            right(1, :) = size*[at%rate(i), -2.0_wp*path%mu(i)**2/at%room(i)]
+            by = at%speed(i)/at%room(i)
+            give(1:, 1:) = at%speed(i)/(path%mu(i)*lam)*frame(1:, 1:)
+            give(1, 1:) = give(1, 1:) + 2.0_wp*by*share**2*frame(1, 1:)
+            give(1, 0) = -2.0_wp*by*path%mu(i)*share
+            right(1, :) = share*[at%speed(i), -2.0_wp*path%mu(i)**2/at%room(i)]
             right(1:, 1) = right(1:, 1) + matmul(frame(1:, 1:), rest%motion(1:, i))
             if (path%is_led(i)) then
                way = path%target(:, i)/path%length(i)
@@ -382,17 +392,19 @@ contains
       step%lam = force(0, :)
       step%tau = force(1:, :)
       step%gap = (product - at%gap*step%lam)/at%lam - at%gap
-      step%rate = 0.0_wp*at%lam
-      step%room = step%rate
-      step%part = step%rate
-      step%over = step%rate
-      step%under = step%rate
+      step%speed = 0.0_wp*at%lam
+      step%room = step%speed
+      step%part = step%speed
+      step%over = step%speed
+      step%under = step%speed
       do i = 1, size(at%lam)
          if (.not. path%rubs(i)) cycle
-         step%room(i) = 2.0_wp*(path%mu(i)**2*at%lam(i)*step%lam(i) - dot_product(at%tau(:, i), &
-            step%tau(:, i)))
-         step%rate(i) = (2.0_wp*path%mu(i)**2*product - at%rate(i)*step%room(i))/at%room(i) &
-            - at%rate(i)
+         associate (share => use(path, at, i))
+            step%room(i) = path%mu(i)*(1.0_wp + sum(share**2))*step%lam(i) &
+               - 2.0_wp*dot_product(share, step%tau(:, i))
+         end associate
+         step%speed(i) = (2.0_wp*path%mu(i)**2*product - at%speed(i)*step%room(i))/at%room(i) &
+            - at%speed(i)
          if (.not. path%is_led(i)) cycle
          associate (left => 1.0_wp - at%part(i), theta => at%part(i))
             step%part(i) = (rest%along(i) + dot_product(step%tau(:, i), path%target(:, i)) &
@@ -414,7 +426,8 @@ contains
       do i = 1, size(at%lam)
          reach = min(reach, until_0(at%lam(i), step%lam(i)), until_0(at%gap(i), step%gap(i)))
          if (.not. path%rubs(i)) cycle
-         reach = min(reach, until_0(at%rate(i), step%rate(i)), until_0(at%room(i), step%room(i)))
+         reach = min(reach, until_0(at%speed(i), step%speed(i)), until_0(at%room(i), &
+            step%room(i)))
          if (.not. path%is_led(i)) cycle
          reach = min(reach, until_0(at%over(i), step%over(i)), until_0(at%under(i), &
             step%under(i)), until_0(at%part(i), step%part(i)), until_0(1.0_wp - at%part(i), &
