@@ -166,9 +166,10 @@ contains
    !> Make room for the derivatives of slip, and set them to 0.
    pure subroutine condition_resize_slip(self)
       type(condition_t), intent(inout) :: self   !! resized
+      integer :: i, s
 
       if (allocated(self%t)) then
-         if (any([size(self%t, 2), size(self%t1, 2)] /= size(self%g, 2)) .or. &
+         if (size(self%t, 2) /= size(self%g, 2) .or. size(self%t1, 2) /= size(self%g, 2) .or. &
             size(self%ht, 1) /= size(self%h, 1)) deallocate(self%t, self%t1, self%ht)
       end if
       associate (n_dim => size(self%g, 1), n => size(self%g, 2), m => size(self%h, 1))
@@ -176,8 +177,12 @@ contains
             self%t1(n_dim, n, n_dim - 1), self%ht(m, m, n_dim - 1), source=0.0_wp)
       end associate
       self%slip = 0.0_wp
-      self%t = 0.0_wp
-      self%t1 = 0.0_wp
+      do s = 1, size(self%t, 3)
+         do i = 1, self%n_node
+            self%t(:, i, s) = 0.0_wp
+            self%t1(:, i, s) = 0.0_wp
+         end do
+      end do
       if (.not. self%leaves_second) self%ht = 0.0_wp
    end subroutine condition_resize_slip
 

@@ -23,15 +23,15 @@ module emcon_frame_slip_space
    end type slip_axis_t
 
    type :: frame_slip_t
-      real(wp) :: f(2) = 0.0_wp                  !! slip over the step [L]
+      real(wp) :: f(2)                           !! slip over the step [L]
       !> By both vectors of the frame and where the point is, from its origin: discrete gradients,
-      real(wp) :: g(n_frame_var, 2) = 0.0_wp
-      real(wp) :: c(n_frame_var, 2) = 0.0_wp     !! gradients at the end,
-      !> and (i, j, which) derivative of g(i, which) by variable j at the end; 0 if not asked for
-      real(wp) :: h(n_frame_var, n_frame_var, 2) = 0.0_wp
+      real(wp) :: g(n_frame_var, 2)
+      real(wp) :: c(n_frame_var, 2)              !! gradients at the end,
+      !> and (i, j, which) derivative of g(i, which) by variable j at the end, if asked for
+      real(wp) :: h(n_frame_var, n_frame_var, 2)
       !> What `c` and `h` have by components of `along` at the end too
-      real(wp) :: c_along(3, 2) = 0.0_wp
-      real(wp) :: h_along(n_frame_var, 3, 2) = 0.0_wp
+      real(wp) :: c_along(3, 2)
+      real(wp) :: h_along(n_frame_var, 3, 2)
    end type frame_slip_t
 
    !> A frame where friction acts, and how directions in its plane turn in that with it.
@@ -55,11 +55,13 @@ contains
       type(frame_slip_t), intent(out) :: slip
       type(frame_vertex_t) :: vertex
       type(frame_turn_t) :: turn
-      real(wp) :: by(2, 2), second(n_frame_var, n_frame_var, 3)
+      real(wp) :: side(3, 2), by(2, 2), second(n_frame_var, n_frame_var, 3)
       integer :: k
 
-      turn = turn_of((x(:, 2:3) - spread(x(:, 1), 2, 2)) &
-         + axis%place*(dx(:, 2:3) - spread(dx(:, 1), 2, 2)), axis%along)
+      do k = 1, 2
+         side(:, k) = (x(:, 1 + k) - x(:, 1)) + axis%place*(dx(:, 1 + k) - dx(:, 1))
+      end do
+      turn = turn_of(side, axis%along)
       by = matmul(transpose(turn%side), turn%basis)
       call frame_affine(frame_of(x(:, :3), dx(:, :3), leaves_second), x(:, 4), dx(:, 4), vertex, &
          second)

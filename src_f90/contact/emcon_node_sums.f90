@@ -26,7 +26,9 @@ contains
       associate (n_dim => size(of_node, 1))
          do i = 1, size(weight, 1)
             own = 0.0_wp
+            ! Most sums are of one node.
             do j = 1, size(weight, 2)
+               if (.not. abs(weight(i, j)) > 0.0_wp) cycle
                own = own + weight(i, j)*part(n_dim*(j - 1) + 1:n_dim*j)
             end do
             of_node(:, place(1 + i)) = of_node(:, place(1 + i)) + factor*own

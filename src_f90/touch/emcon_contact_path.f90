@@ -10,7 +10,7 @@
 module emcon_contact_path
    use emcon_contact_problem, only : contact_problem_forces, contact_problem_map, &
       contact_problem_missed, contact_problem_motion, contact_problem_stiffness, &
-      contact_problem_t, met
+      contact_problem_t, contact_problem_weigh, met
    use emcon_contact_trials, only : contact_trials
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -260,30 +260,36 @@ contains
       real(wp), allocatable, intent(out) :: change(:, :, :)  !! (0:n_slip, n, 2)
       logical, intent(out) :: has_step
       real(dp), allocatable :: a(:, :), b(:, :), x(:, :)
-      real(wp), dimension(0:self%n_slip, 0:self%n_slip) :: frame, give, own
-      real(wp) :: right(0:self%n_slip, 2), row_size
+      real(wp), allocatable, dimension(:, :, :) :: own, give
+      real(wp) :: frame(0:self%n_slip, 0:self%n_slip), right(0:self%n_slip, 2)
+      real(dp) :: row_size(size(self%w, 1))
       logical :: is_singular
       integer :: i, k, m
 
       m = 1 + self%n_slip
       associate (n => size(at%lam))
-         allocate(a(m*n, m*n), b(m*n, 2), x(m*n, 2))
+         allocate(a(m*n, m*n), b(m*n, 2), x(m*n, 2), own(0:m - 1, 0:m - 1, n), &
+            give(0:m - 1, 0:m - 1, n))
+         do i = 1, n
+            call find_place(path, at, rest, i, frame, give(:, :, i), right)
+            own(:, :, i) = path%c(i)*frame - give(:, :, i)*spread(self%hold(:, i), 1, m)
+            b(m*(i - 1) + 1:m*i, :) = real(right, dp)
+         end do
+         call contact_problem_weigh(self, own, a)
          do i = 1, n
             associate (row => m*(i - 1) + 1)
-               call find_place(path, at, rest, i, frame, give, right)
-               own = path%c(i)*frame - give*spread(self%hold(:, i), 1, m)
-               a(row:row + m - 1, :) = real(matmul(own, self%w(row:row + m - 1, :)), dp)
-               a(row:row + m - 1, row:row + m - 1) = a(row:row + m - 1, row:row + m - 1) &
-                  + real(give, dp)
-               b(row:row + m - 1, :) = real(right, dp)
+               a(row:m*i, row:m*i) = a(row:m*i, row:m*i) + real(give(:, :, i), dp)
             end associate
          end do
+         row_size = 0.0_dp
          do k = 1, m*n
-            row_size = real(maxval(abs(a(k, :))), wp)
-            if (.not. row_size > 0.0_wp) row_size = 1.0_wp
-            a(k, :) = a(k, :)/real(row_size, dp)
-            b(k, :) = b(k, :)/real(row_size, dp)
+            row_size = max(row_size, abs(a(:, k)))
          end do
+         where (.not. row_size > 0.0_dp) row_size = 1.0_dp
+         do k = 1, m*n
+            a(:, k) = a(:, k)/row_size
+         end do
+         b = b/spread(row_size, 2, 2)
          call dense_solve(a, b, x, is_singular)
          has_step = .not. is_singular
          change = reshape(real(x, wp), [m, n, 2])

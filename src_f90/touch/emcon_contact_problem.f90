@@ -14,7 +14,8 @@ module emcon_contact_problem
    public :: contact_problem_t, contact_effort_t, contact_problem_create, contact_problem_force, &
       contact_problem_forces, contact_problem_motion, contact_problem_map, contact_problem_missed, &
       contact_problem_missed_by, contact_problem_slope, contact_problem_status, &
-      contact_problem_stiffness, contact_problem_own_stiffness, contact_problem_row_sizes
+      contact_problem_stiffness, contact_problem_own_stiffness, contact_problem_row_sizes, &
+      contact_problem_weigh
 
    !> The law is met where it is missed by less than this part of the largest force: by what a solve
    !> in double precision leaves of some hundred forces. Where no turn comes to that W is nearly
@@ -109,12 +110,26 @@ contains
       end do
    end subroutine add_product
 
+   !> Add |A| |x|, column by column.
+   pure subroutine add_sizes(a, x, n, sum)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: a(n, n), x(n)
+      real(wp), intent(inout) :: sum(n)
+      integer :: j
+
+      do j = 1, n
+         sum = sum + abs(a(:, j))*abs(x(j))
+      end do
+   end subroutine add_sizes
+
    !> What W may round: the sum of sizes of its rows [T^2/M].
    pure function contact_problem_row_sizes(self) result(row_size)
       type(contact_problem_t), intent(in) :: self
       real(wp) :: row_size(0:self%n_slip, size(self%mu))
+      integer :: i
 
-      row_size = reshape(sum(abs(self%w), 2), shape(row_size))
+      row_size = 0.0_wp
+      call add_sizes(self%w, [(1.0_wp, i = 1, size(self%w, 2))], size(row_size), row_size)
    end function contact_problem_row_sizes
 
    !> The stiffness by which a miss of the law at contact `i` is a force [M/T^2].
@@ -196,8 +211,7 @@ contains
       if (present(row_size)) then
          moved = moved + maxval(abs(push))*row_size
       else
-         moved = moved + reshape(matmul(abs(self%w), reshape(abs(push), [size(push)])), &
-            shape(push))
+         call add_sizes(self%w, push, size(push), moved)
       end if
       do i = 1, size(self%mu)
          missed = max(missed, maxval(abs(defect(:, i)) - rounded*moved(:, i) &
@@ -234,8 +248,8 @@ contains
       real(wp), intent(in) :: by(0:, 0:, :)          !! as of `contact_problem_map`
       real(dp), intent(out) :: slope(:, :)           !! of `defect` by y, as W
       real(wp) :: gain(0:self%n_slip, 0:self%n_slip, size(self%mu))
-      real(wp), dimension(size(self%mu)) :: own, stiffness
-      integer :: a, i, j, k, m
+      real(wp), dimension(size(self%mu)) :: stiffness
+      integer :: i, k, m
 
       m = 1 + self%n_slip
       do i = 1, size(self%mu)
@@ -245,15 +259,7 @@ contains
             gain(k, k, i) = gain(k, k, i) - self%hold(k, i)
          end do
       end do
-      do j = 1, size(slope, 2)
-         do a = 0, self%n_slip
-            own = gain(a, 0, :)*self%w(1::m, j)
-            do k = 1, self%n_slip
-               own = own + gain(a, k, :)*self%w(1 + k::m, j)
-            end do
-            slope(1 + a::m, j) = real(own, dp)
-         end do
-      end do
+      call contact_problem_weigh(self, gain, slope)
       do i = 1, size(self%mu)
          associate (row => m*(i - 1) + 1)
             do k = 0, self%n_slip
@@ -265,6 +271,33 @@ contains
          end associate
       end do
    end subroutine contact_problem_slope
+
+   !> Weighted sums of the rows of W of each contact. Row by row of W, which lie side by side: a sum
+   !> takes rows before and after its own.
+   pure subroutine contact_problem_weigh(self, weight, sum)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: weight(0:, 0:, :)      !! (0:n_slip, 0:n_slip, n) sum, of row
+      real(dp), intent(out) :: sum(:, :)             !! as W
+      real(wp) :: by(size(self%w, 1), -most_slips:most_slips), own(size(self%w, 1))
+      integer :: i, j, k, n, row, shift
+
+      n = size(self%w, 1)
+      by = 0.0_wp
+      do i = 1, size(weight, 3)
+         do k = 0, self%n_slip
+            row = (1 + self%n_slip)*(i - 1) + 1 + k
+            by(row, -k:self%n_slip - k) = weight(k, :, i)
+         end do
+      end do
+      do j = 1, n
+         own = by(:, 0)*self%w(:, j)
+         do shift = 1, self%n_slip
+            own(1 + shift:) = own(1 + shift:) + by(1 + shift:, -shift)*self%w(:n - shift, j)
+            own(:n - shift) = own(:n - shift) + by(:n - shift, shift)*self%w(1 + shift:, j)
+         end do
+         sum(:, j) = real(own, dp)
+      end do
+   end subroutine contact_problem_weigh
 
    !> By which part of its W row `k` of contact `i` is stiffer in a step.
    pure real(wp) function proximal_part(self, i, k) result(part)

@@ -190,16 +190,15 @@ contains
 
       allocate(full(size(pushes), size(pushes)))
       call contact_problem_slope(self, by, full)
-      pushes = .false.
-      do j = 1, size(pushes)
-         pushes(:j - 1) = pushes(:j - 1) .or. abs(full(:j - 1, j)) > 0.0_dp
-         pushes(j + 1:) = pushes(j + 1:) .or. abs(full(j + 1:, j)) > 0.0_dp
-         pushes(j) = pushes(j) .or. abs(full(j, j) - 1.0_dp) > 0.0_dp
-      end do
+      pushes = reshape(any(abs(by) > 0.0_wp, 2) .or. abs(self%hold) > 0.0_wp, shape(pushes))
       slope%pushes = pushes
       slope%row = pack([(j, j = 1, size(pushes))], pushes)
       slope%by_other = full(slope%row, pack([(j, j = 1, size(pushes))], .not. pushes))
-      call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
+      if (all(pushes)) then
+         call dense_lu(full, slope%lu, is_singular)
+      else
+         call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
+      end if
       slope%is_known = .not. is_singular
       slope%stays = slope%is_known
       slope%by = by
