@@ -238,9 +238,10 @@ contains
             has_looked = has_looked .or. .not. self%candidates%have_changed
             ! What stops is led there before the step is solved with what it is not led to.
             leads = .false.
-            if (self%friction%looks_back) call friction_look_back(self%friction, system, self%set, &
-               motion, leads)
-            solve%early%is_made = .not. leads    ! else laws are not those it was solved with
+            if (has_looked .and. self%friction%looks_back) call friction_look_back(self%friction, &
+               system, self%set, motion, leads, .true.)
+            ! By other laws the solution begins anew.
+            solve%early%is_made = solve%early%is_made .and. .not. leads
             cycle
          end if
          call keep(self, solve%law)

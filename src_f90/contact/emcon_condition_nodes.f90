@@ -166,7 +166,6 @@ contains
    !> Make room for the derivatives of slip, and set them to 0.
    pure subroutine condition_resize_slip(self)
       type(condition_t), intent(inout) :: self   !! resized
-      integer :: i, s
 
       if (allocated(self%t)) then
          if (size(self%t, 2) /= size(self%g, 2) .or. size(self%t1, 2) /= size(self%g, 2) .or. &
@@ -177,12 +176,8 @@ contains
             self%t1(n_dim, n, n_dim - 1), self%ht(m, m, n_dim - 1), source=0.0_wp)
       end associate
       self%slip = 0.0_wp
-      do s = 1, size(self%t, 3)
-         do i = 1, self%n_node
-            self%t(:, i, s) = 0.0_wp
-            self%t1(:, i, s) = 0.0_wp
-         end do
-      end do
+      self%t = 0.0_wp
+      self%t1 = 0.0_wp
       if (.not. self%leaves_second) self%ht = 0.0_wp
    end subroutine condition_resize_slip
 

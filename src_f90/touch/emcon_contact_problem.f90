@@ -279,7 +279,7 @@ contains
       real(wp), intent(in) :: weight(0:, 0:, :)      !! (0:n_slip, 0:n_slip, n) sum, of row
       real(dp), intent(out) :: sum(:, :)             !! as W
       real(wp) :: by(size(self%w, 1), -most_slips:most_slips), own(size(self%w, 1))
-      integer :: i, j, k, n, row, shift
+      integer :: first, last, i, j, k, n, row, shift
 
       n = size(self%w, 1)
       by = 0.0_wp
@@ -290,10 +290,12 @@ contains
          end do
       end do
       do j = 1, n
-         own = by(:, 0)*self%w(:, j)
-         do shift = 1, self%n_slip
-            own(1 + shift:) = own(1 + shift:) + by(1 + shift:, -shift)*self%w(:n - shift, j)
-            own(:n - shift) = own(:n - shift) + by(:n - shift, shift)*self%w(1 + shift:, j)
+         own = 0.0_wp
+         do shift = -self%n_slip, self%n_slip
+            first = max(1, 1 - shift)
+            last = min(n, n - shift)
+            own(first:last) = own(first:last) + by(first:last, shift) &
+               *self%w(first + shift:last + shift, j)
          end do
          sum(:, j) = real(own, dp)
       end do

@@ -430,7 +430,7 @@ def test_dominoes_fall_one_after_the_other(count: int, until: float, tmp_path: P
 
 
 @pytest.mark.parametrize(("rows", "until"), [
-    ((3, 2, 1), .6), pytest.param((10, 9), 2.0, marks=pytest.mark.long),
+    ((3, 2, 1), 1.0), pytest.param((10, 9), 2.0, marks=pytest.mark.long),
     pytest.param((8, 7, 6, 5, 4), 4.0, marks=pytest.mark.long)])
 def test_a_pile_comes_to_rest(rows: tuple[int, ...], until: float, tmp_path: Path) -> None:
     """Each row falls onto the gaps of the one below. Impacts leave a quarter of the energy of what goes along normals, over
