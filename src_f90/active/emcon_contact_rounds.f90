@@ -236,10 +236,11 @@ contains
             call candidates_look(self, system, motion, status, .false.)
             if (status /= step_done) return
             has_looked = has_looked .or. .not. self%candidates%have_changed
-            ! What stops is led there before the step is solved with what it is not led to.
+            ! What stops is led there before the step is solved with what it is not led to; where
+            ! slip is measured by points that will be others it is not told yet how far that is.
             leads = .false.
-            if (has_looked .and. self%friction%looks_back) call friction_look_back(self%friction, &
-               system, self%set, motion, leads, .true.)
+            if (has_looked .and. self%friction%looks_back .and. .not. self%friction%lags) &
+               call friction_look_back(self%friction, system, self%set, motion, leads, .true.)
             ! By other laws the solution begins anew.
             solve%early%is_made = solve%early%is_made .and. .not. leads
             cycle
