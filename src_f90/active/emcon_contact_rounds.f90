@@ -231,18 +231,8 @@ contains
          self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (allocated(error)) return
          if (status == newton_early) then
-            newton%driven = 0.0_wp
-            call keep(self, solve%law)
-            call candidates_look(self, system, motion, status, .false.)
+            call look_early(self, solve, system, newton, motion, has_looked, status)
             if (status /= step_done) return
-            has_looked = has_looked .or. .not. self%candidates%have_changed
-            ! What stops is led there before the step is solved with what it is not led to; where
-            ! slip is measured by points that will be others it is not told yet how far that is.
-            leads = .false.
-            if (has_looked .and. self%friction%looks_back .and. .not. self%friction%lags) &
-               call friction_look_back(self%friction, system, self%set, motion, leads, .true.)
-            ! By other laws the solution begins anew.
-            solve%early%is_made = solve%early%is_made .and. .not. leads
             cycle
          end if
          call keep(self, solve%law)
@@ -261,6 +251,29 @@ contains
       end do
       status = step_cycling
    end subroutine solve_in_rounds
+
+   !> Look at candidates before the step is solved to the end. If they stand, what stops is led there
+   !> now: the step need not be solved with what it is not led to. Where slip is measured by points
+   !> that will be others it is not told yet how far that is.
+   subroutine look_early(self, solve, system, newton, motion, has_looked, status)
+      type(active_set_t), intent(inout) :: self
+      type(contact_newton_t), intent(inout) :: solve     !! by other laws it begins anew
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(in) :: motion
+      logical, intent(inout) :: has_looked       !! and nothing has changed
+      integer, intent(out) :: status             !! one of the `step_` codes
+      logical :: leads
+
+      newton%driven = 0.0_wp
+      call keep(self, solve%law)
+      call candidates_look(self, system, motion, status, .false.)
+      if (status /= step_done) return
+      has_looked = has_looked .or. .not. self%candidates%have_changed
+      if (.not. has_looked .or. .not. self%friction%looks_back .or. self%friction%lags) return
+      call friction_look_back(self%friction, system, self%set, motion, leads, .true.)
+      solve%early%is_made = solve%early%is_made .and. .not. leads
+   end subroutine look_early
 
    !> Multipliers and ways of the candidates: what is not open acts.
    subroutine keep(self, law)

@@ -3,9 +3,10 @@
 !> Forces are kept inside of what the law allows: lam > 0, |tau| < mu lam. Gaps g, speeds sigma and
 !> the room rho = mu lam - tau^2/(mu lam) that friction has are unknowns of their own, with products
 !> that are to be e^2 on the path and 0 at its end: c g lam, sigma rho/(2 mu^2), where c slip
-!> = sigma tau/(mu lam). As a contact opens sigma tends to the size of c slip. A slip a that is led to adds theta c a with 0 < theta < 1 and tau.a/|a| = over - under, where
-!> over (1 - theta) c |a| and under theta c |a| are e^2. Of forces that follow from others the path
-!> leads to those farthest from limits, however far these are from those before.
+!> = sigma tau/(mu lam). As a contact opens sigma tends to the size of c slip. A slip a that is led
+!> to adds theta c a with 0 < theta < 1 and tau.a/|a| = over - under, where over (1 - theta) c |a|
+!> and under theta c |a| are e^2. Of forces that follow from others the path leads to those farthest
+!> from limits, however far these are from those before.
 !> Source: docs/theory.md, eq. (14i).
 module emcon_contact_path
    use emcon_contact_problem, only : contact_problem_forces, contact_problem_map, &
