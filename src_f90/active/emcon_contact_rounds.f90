@@ -252,9 +252,9 @@ contains
       status = step_cycling
    end subroutine solve_in_rounds
 
-   !> Look at candidates before the step is solved to the end. If they stand, what stops is led there
-   !> now: the step need not be solved with what it is not led to. Where slip is measured by points
-   !> that will be others it is not told yet how far that is.
+   !> Look at candidates before the step is solved to the end. If they stand, what stops is led
+   !> there now: the step need not be solved with what it is not led to. Where slip is measured by
+   !> points that will be others it is not told yet how far that is.
    subroutine look_early(self, solve, system, newton, motion, has_looked, status)
       type(active_set_t), intent(inout) :: self
       type(contact_newton_t), intent(inout) :: solve     !! by other laws it begins anew
