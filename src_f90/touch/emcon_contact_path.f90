@@ -53,7 +53,7 @@ module emcon_contact_path
       real(wp), allocatable :: gap(:)            !! (n) > 0
       real(wp), allocatable :: speed(:)          !! (n) sigma > 0
       real(wp), allocatable :: room(:)           !! (n) rho = mu lam - tau^2/(mu lam) > 0
-      real(wp), allocatable :: part(:)           !! (n) theta, 0 < theta < 1 [1]
+      real(wp), allocatable :: part(:), left(:)  !! (n) theta > 0 and 1 - theta > 0 [1]
       real(wp), allocatable :: over(:), under(:) !! (n) > 0
    end type point_t
 
@@ -137,6 +137,7 @@ contains
          at%room = path%mu*at%lam
          at%speed = 2.0_wp*at%room
          at%part = spread(0.5_wp, 1, n)
+         at%left = at%part
          at%over = 2.0_wp*path%largest**2/path%length
          at%under = at%over
          end associate
@@ -198,6 +199,7 @@ contains
       at%room = max(at%room + gone*step%room, (1.0_wp - inside)*at%room)
       call keep_inside(path, at)
       at%part = at%part + gone*step%part
+      at%left = at%left - gone*step%part
       at%over = at%over + gone*step%over
       at%under = at%under + gone*step%under
    end subroutine advance
@@ -244,8 +246,8 @@ contains
       do i = 1, size(at%lam)
          product = product + at%lam(i)*at%gap(i)
          if (path%rubs(i)) product = product + at%speed(i)*at%room(i)/(2.0_wp*path%mu(i)**2)
-         if (path%is_led(i)) product = product + path%length(i)*(at%over(i)*(1.0_wp &
-            - at%part(i)) + at%under(i)*at%part(i))
+         if (path%is_led(i)) product = product + path%length(i)*(at%over(i)*at%left(i) &
+            + at%under(i)*at%part(i))
       end do
       product = product/(size(at%lam) + count(path%rubs) + 2*count(path%is_led))
    end function mean_product
@@ -349,7 +351,7 @@ contains
       type(point_t), intent(in) :: at
       integer, intent(in) :: i
 
-      width = at%over(i)/(1.0_wp - at%part(i)) + at%under(i)/at%part(i)
+      width = at%over(i)/at%left(i) + at%under(i)/at%part(i)
    end function width
 
    !> What over - under changes by as products become 0, and by each unit of them.
@@ -365,7 +367,7 @@ contains
       type(point_t), intent(in) :: at
       integer, intent(in) :: i
 
-      off = (1.0_wp/(1.0_wp - at%part(i)) - 1.0_wp/at%part(i))/path%length(i)
+      off = (1.0_wp/at%left(i) - 1.0_wp/at%part(i))/path%length(i)
    end function off_by_product
 
    !> Along friction, and across.
@@ -413,7 +415,7 @@ contains
          step%speed(i) = (2.0_wp*path%mu(i)**2*product - at%speed(i)*step%room(i))/at%room(i) &
             - at%speed(i)
          if (.not. path%is_led(i)) cycle
-         associate (left => 1.0_wp - at%part(i), theta => at%part(i))
+         associate (left => at%left(i), theta => at%part(i))
             step%part(i) = (rest%along(i) + dot_product(step%tau(:, i), path%target(:, i)) &
                /path%length(i) - off(at, i) - product*off_by_product(path, at, i))/width(at, i)
             step%over(i) = (product/path%length(i) + at%over(i)*step%part(i))/left - at%over(i)
@@ -437,7 +439,7 @@ contains
             step%room(i)))
          if (.not. path%is_led(i)) cycle
          reach = min(reach, until_0(at%over(i), step%over(i)), until_0(at%under(i), &
-            step%under(i)), until_0(at%part(i), step%part(i)), until_0(1.0_wp - at%part(i), &
+            step%under(i)), until_0(at%part(i), step%part(i)), until_0(at%left(i), &
             -step%part(i)))
       end do
    end function reach
