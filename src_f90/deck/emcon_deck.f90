@@ -3,7 +3,7 @@
 !> `deck_open` reads files, `deck_read` understands what they say from memory only, so that a
 !> restart file can carry the deck it belongs to.
 module emcon_deck
-   use emcon_deck_cards, only : read_cards
+   use emcon_deck_cards, only : check_parts, read_cards
    use emcon_deck_axial_plane, only : check_axial
    use emcon_deck_centrifugal, only : check_centrifugal
    use emcon_deck_check, only : check_materials, check_nodes
@@ -73,6 +73,7 @@ contains
       reader%number => source%number
       reader%log = diagnostics
       if (parts_are_used(source)) then
+         call check_parts(reader)
          call parts_flatten(source, flat, scene%deck%labels, reader%log)
          reader%line => flat%line
          reader%file => flat%file

@@ -14,7 +14,7 @@ module emcon_deck_cards
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_cards
+   public :: read_cards, check_parts
 
    !> Where the reading of cards stands.
    type :: place_t
@@ -54,6 +54,36 @@ contains
          call add_error(reader%log, origin_t(1, 0), "the deck is empty: it has no keyword")
       end if
    end subroutine read_cards
+
+   !> Hold the cards of parts and instances against the registry: they leave before cards are read.
+   subroutine check_parts(reader)
+      type(reader_t), intent(inout) :: reader
+      type(card_t) :: card
+      character(len=:), allocatable :: text
+      logical :: has_data
+      integer :: i, k
+
+      has_data = .true.
+      i = 0
+      do while (i < size(reader%line))
+         i = i + 1
+         if (is_card(reader%line(i)%text)) then
+            k = i
+            call gather_keyword(reader%line, i, text)
+            call split_keyword(text, card%title, card%name, card%option)
+            has_data = all(card%name /= [character(len=11) :: "PART", "ENDPART", "ASSEMBLY", &
+               "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE"])
+            if (has_data) cycle
+            has_data = card%name == "INSTANCE"
+            card%origin = line_origin(reader, k)
+            call check_options(reader, card, trim(keywords(find_keyword(card%name))%parameters))
+         else if (.not. has_data .and. .not. is_comment(reader%line(i)%text)) then
+            call add_error(reader%log, line_origin(reader, i), card%title &
+               // ": has no data lines, but " // quoted(reader%line(i)%text) // " follows")
+            has_data = .true.
+         end if
+      end do
+   end subroutine check_parts
 
    pure integer function count_cards(reader)
       type(reader_t), intent(in) :: reader

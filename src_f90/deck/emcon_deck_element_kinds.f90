@@ -113,7 +113,7 @@ contains
 
       is_user_type = len_trim(name) > 1 .and. len_trim(name) <= 1 + most_digits
       if (is_user_type) is_user_type = name(1:1) == "U" .and. verify(trim(name(2:)), &
-         "0123456789") == 0
+         "0123456789") == 0 .and. verify(trim(name(2:)), "0") > 0
    end function is_user_type
 
    !> Is there a card that defines the type `name`, right or wrong?

@@ -4,7 +4,7 @@ module emcon_deck_element_loads
    use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, get_real, &
       is_blank, is_label, next_line
-   use emcon_deck_loads, only : card_amplitude, is_new
+   use emcon_deck_loads, only : card_amplitude, get_load, is_new
    use emcon_deck_named, only : get_elements
    use emcon_deck_reader, only : card_t, reader_t
    use emcon_deck_surfaces, only : surface_names
@@ -93,8 +93,7 @@ contains
          call check_count(reader, data, 2, 3, "surface, P, pressure")
          if (data%ok) call get_name(reader, data, 2, "load type", name)
          if (data%ok) call check_surface_type(reader, data, name)
-         new%value = 0.0_wp
-         if (data%ok) call get_real(reader, data, 3, "pressure", new%value)
+         if (data%ok) call get_load(reader, data, "pressure", new%value)
          if (data%ok) call get_faces(reader, data, scene, item, face)
          if (data%ok) call put_loads(self, new, item, face)
       end do
@@ -206,10 +205,9 @@ contains
 
       n_face = maxval(scene%element%kinds%n_face)
       call get_name(reader, data, 2, "load type", name)
-      new%value = 0.0_wp
       new%direction = 0.0_wp
       new%point = 0.0_wp
-      call get_real(reader, data, 3, "magnitude", new%value)
+      call get_load(reader, data, "magnitude", new%value)
       if (.not. data%ok) return
       new%place = face_number(name, "P", n_face)
       if (name == "P") new%place = on_surface

@@ -57,7 +57,10 @@ contains
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
             if (card%name /= "EQUATION") cycle
-            if (card%step == 0) then
+            if (card%step == 0 .and. (has_option(card, "REMOVE") .or. has_option(card, &
+               "REMOVEALL"))) then
+               call card_error(reader, card, "REMOVE may stand only inside a step")
+            else if (card%step == 0) then
                call read_card(reader, card, scene, list)
             else if (has_option(card, "REMOVE") .or. has_option(card, "REMOVEALL")) then
                call remove_equations(reader, card, scene, list)

@@ -97,16 +97,21 @@ contains
    end subroutine drop_zeros
 
    !> Refuse the data lines of a card that has none, once; zeros say nothing.
-   subroutine refuse_lines(reader, card)
+   subroutine refuse_lines(reader, card, when)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      character(len=*), intent(in), optional :: when   !! it has none, with a blank behind
       type(data_t) :: data
+      character(len=:), allocatable :: title
 
+      title = ""
+      if (present(when)) title = when
       call data_open(data, card)
       do while (next_line(reader, data))
          call drop_zeros(data, 0)
          if (data%n == 0) cycle
-         call data_error(reader, data, "has no data lines, but " // quoted(data%text) // " follows")
+         call data_error(reader, data, title // "has no data lines, but " // quoted(data%text) &
+            // " follows")
          return
       end do
    end subroutine refuse_lines

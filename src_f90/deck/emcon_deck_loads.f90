@@ -19,7 +19,7 @@ module emcon_deck_loads
    use emcon_text, only : to_text
    implicit none
    private
-   public :: read_boundary, read_cload, card_amplitude, is_new
+   public :: read_boundary, read_cload, card_amplitude, get_load, is_new
 
    !> Degrees of freedom are numbered up to this one: 3 is out of the plane, 4 to 6 are rotations.
    integer, parameter :: last_freedom = 6
@@ -296,8 +296,7 @@ contains
          call check_count(reader, data, 2, 3, "node or node set, degree of freedom, force")
          if (.not. data%ok) cycle
          call get_integer(reader, data, 2, "degree of freedom", freedom)
-         new%value = 0.0_wp
-         call get_real(reader, data, 3, "force", new%value)
+         call get_load(reader, data, "force", new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (data%ok) call check_force(reader, data, scene, item, freedom, new%value)
          if (.not. data%ok) cycle
@@ -307,6 +306,20 @@ contains
          end do
       end do
    end subroutine read_cload
+
+   !> The value of a load, field 3 of a line: an empty field is 0, and so is one that is not there,
+   !> which is told.
+   subroutine get_load(reader, data, what, value)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      character(len=*), intent(in) :: what         !! it is, for messages
+      real(wp), intent(out) :: value
+
+      value = 0.0_wp
+      call get_real(reader, data, 3, what, value)
+      if (data%ok .and. is_blank(data, 3) .and. .not. data%ends_in_comma) call data_warning( &
+         reader, data, "the " // what // " is missing: 0 is taken")
+   end subroutine get_load
 
    !> What acts where a line says: a force on a node; a moment on the reference node of a rigid
    !> body, by its own rotations or as a force on the ROT NODE; or nothing.

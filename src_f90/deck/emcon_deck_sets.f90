@@ -1,11 +1,11 @@
 !> Node and element sets: all cards that make or fill them.
 module emcon_deck_sets
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
-      get_integer, get_name, is_label, next_line
+      get_integer, get_name, is_label, next_line, refuse_lines
    use emcon_deck_labels, only : find_label, label_map_t, label_range
    use emcon_deck_named, only : refuse_name, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
-   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_diagnostics, only : add_warning, quoted, suggestion
    use emcon_mesh, only : named_set_t
    use emcon_name_index, only : name_index_find, name_index_put, name_index_t
    use emcon_scene, only : scene_t
@@ -131,7 +131,21 @@ contains
             call read_entries(reader, card, builder, i_set, map, is_doubted)
          end if
       end do
+      call warn_of_empty(reader, builder)
    end subroutine build_sets
+
+   !> A set that nothing is in; after an error something may be missing in it.
+   subroutine warn_of_empty(reader, builder)
+      type(reader_t), intent(inout) :: reader
+      type(builder_t), intent(in) :: builder
+      integer :: i
+
+      if (reader%log%n_errors > 0) return
+      do i = 1, builder%n
+         if (builder%list(i)%n == 0) call add_warning(reader%log, builder%set(i)%origin, &
+            trim(builder%what) // " set " // quoted(builder%set(i)%name) // " is empty")
+      end do
+   end subroutine warn_of_empty
 
    !> *NSET, ELSET=: the nodes of the elements and lines of a set.
    subroutine append_nodes_of(reader, card, scene, list)
@@ -145,6 +159,7 @@ contains
       call need_name(reader, card, "ELSET", name)
       if (has_option(card, "GENERATE")) call card_error(reader, card, &
          "ELSET and GENERATE exclude each other")
+      call refuse_lines(reader, card, "with ELSET= ")
       i_set = name_index_find(reader%names%element_sets, name)
       if (i_set > 0) then
          associate (item => scene%set%element(i_set)%item)

@@ -204,9 +204,9 @@ contains
       call data_open(data, card)
       do while (next_line(reader, data))
          call check_count(reader, data, 1, 2, "node or node set, area")
-         if (data%n > 1 .and. .not. is_area_told) call data_warning(reader, data, "the area " &
-            // "has no effect: contact is exact, and pressure at a surface of nodes is not known " &
-            // "(told once)")
+         if (data%n > 1 .and. .not. is_area_told) call data_warning(reader, data, "the " &
+            // "second value, " // data%text(data%from(data%n):data%to(data%n)) // ", is an area " &
+            // "and has no effect: a line has one node or set (told once)")
          is_area_told = is_area_told .or. data%n > 1
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (.not. data%ok) cycle

@@ -11,6 +11,9 @@ module emcon_tie_couple
    private
    public :: tie_couple_t, tie_couple_of, tie_couple_add
 
+   !> Part of the sum of all moments, without their signs, that is rounding only.
+   real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
+
    type :: tie_couple_t
       real(wp) :: largest = 0.0_wp               !! couple [M L^2/T^2]
       !> (turns) change of the angular momentum by ties in dynamic steps [M L^2/T]
@@ -26,15 +29,19 @@ contains
       real(wp), intent(in) :: place(:, :)        !! (n_dim, n_node) where nodes are [L]
       real(wp), intent(in) :: residual(:, :)     !! (n_dim, n_node) what holds them [M L/T^2]
       real(wp) :: couple(n_turn(size(place, 1)))
-      real(wp) :: gathered(size(place, 1), size(place, 2))
+      real(wp) :: gathered(size(place, 1), size(place, 2)), size_of_all
       integer :: i
 
       gathered = residual
       call gather_dependent(numbering, gathered)
       couple = 0.0_wp
+      size_of_all = 0.0_wp
       do i = 1, size(place, 2)
          call add_moments(place(:, i), residual(:, i) - gathered(:, i), couple)
+         size_of_all = size_of_all + norm2(place(:, i))*norm2(residual(:, i) - gathered(:, i))
       end do
+      ! Surfaces that touch leave a rest of rounding.
+      if (norm2(couple) <= rounding*size_of_all) couple = 0.0_wp
    end function tie_couple_of
 
    !> A step of duration `h` with the couple as its mean.

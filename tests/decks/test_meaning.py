@@ -555,3 +555,25 @@ def test_what_is_not_here_says_what_to_do_instead(card, told, tmp_path):
     deck.write_text(card + moving())
     done = emcon("check", deck)
     assert done.returncode == 2 and "known but not supported" in done.stderr and told in done.stderr
+
+
+def test_a_tie_of_surfaces_that_touch_tells_no_couple(tmp_path):
+    """ADJUST=NO without a gap: what is left of the couple is rounding."""
+    upper = """\
+*NODE
+11, 0.3, 2.
+12, 0.8, 2.
+13, 0.8, 3.
+14, 0.3, 3.
+*ELEMENT, TYPE=CPE4, ELSET=BLOCK
+11, 11, 12, 13, 14
+*SOLID SECTION, ELSET=BLOCK, MATERIAL=M
+*SURFACE, NAME=LOWER
+BLOCK, S1
+*TIE, NAME=T, ADJUST=NO
+LOWER, UPPER
+"""
+    step = static("*BOUNDARY\n13, 1\n14, 1\n13, 2, 2, -0.05\n14, 2, 2, -0.05\n")
+    assert run(tmp_path, BAR + upper + step).verdict["warnings"] == []
+    wide = BAR + upper.replace("2.\n12", "2.01\n12").replace("0.8, 2.\n", "0.8, 2.01\n") + step
+    assert "have a couple of up to" in run(tmp_path, wide).verdict["warnings"][0]
