@@ -165,7 +165,10 @@ contains
       end if
       if (.not. allocated(error)) return
       code = error%code
-      if (.not. is_told) write(error_unit, "(a)", iostat=ignored) "emcon: " // &
+      if (is_told) return
+      ! What begins with file and line is left as it is, for editors that jump there.
+      is_told = index(error%message, ": error: ") > 0
+      write(error_unit, "(a)", iostat=ignored) repeat("emcon: ", merge(0, 1, is_told)) // &
          printable(error%message)
    end subroutine tell
 

@@ -4,7 +4,7 @@ module emcon_deck_cards
       keyword_t, keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
       mark_without_effect, parameter_mark, parameter_names, parameter_reason, refusal_of, refusal_t
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
-      substitute_parameters, unused_override
+      substitute_parameters, told_already, unused_override
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, note_idle, &
       reader_t
    use emcon_deck_text, only : gather_keyword, is_card, is_comment, option_t, split_keyword
@@ -169,7 +169,8 @@ contains
       if (index(text, "<") == 0) return
       call substitute_parameters(parameters, text, patched, fault)
       is_resolved = fault == ""
-      if (.not. is_resolved) call add_error(reader%log, line_origin(reader, i), fault)
+      if (.not. is_resolved .and. fault /= told_already) call add_error(reader%log, &
+         line_origin(reader, i), fault)
       call move_alloc(patched, text)
    end subroutine put_parameters
 

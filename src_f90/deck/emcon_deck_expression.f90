@@ -22,6 +22,7 @@ module emcon_deck_expression
       character(len=:), allocatable :: text        !! what `<name>` becomes
       real(wp) :: value = 0.0_wp
       logical :: is_number = .true.
+      logical :: is_faulty = .false.               !! its definition was refused
    end type parameter_t
 
    !> The values known so far.

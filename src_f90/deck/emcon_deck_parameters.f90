@@ -11,10 +11,13 @@ module emcon_deck_parameters
    implicit none
    private
    public :: parameters_t, parameters_init, parameter_define, unused_override
-   public :: substitute_parameters
+   public :: substitute_parameters, told_already
 
    !> Digits that bring a value of kind `wp` back unchanged.
    integer, parameter :: round_trip_digits = 2 + int(real(digits(1.0_wp), wp)*log10(2.0_wp))
+
+   !> The fault of a line whose parameter was refused where it is defined.
+   character(len=*), parameter :: told_already = "told already"
 
    !> A value that the command line sets.
    type :: override_t
@@ -76,6 +79,7 @@ contains
          self%override(i)%is_used = .true.
       end do
       call evaluate_text(self, text, new, fault)
+      new%is_faulty = fault /= ""
       if (fault /= "") fault = "parameter " // new%name // ": " // fault
       call store_parameter(self%table, new)
    end subroutine parameter_define
@@ -178,6 +182,10 @@ contains
          if (i == 0) then
             fault = "unknown parameter <" // name // ">" &
                // suggestion(name, parameter_list(self%table))
+            text = line
+            return
+         else if (self%table%item(i)%is_faulty) then
+            fault = told_already
             text = line
             return
          end if

@@ -66,6 +66,11 @@ contains
          new%node = unique_sorted([pack(of_element, of_element > 0), node, new%reference])
       end associate
       call check_alone(reader, card, scene, new)
+      ! A profile or set that was refused has no nodes.
+      if (size(new%node) == 1 .and. reader%log%n_errors > 0) then
+         reader%doubt%rigid = .true.
+         return
+      end if
       call rigid_frame_choose(scene%x, new%node, new%reference, new%frame)
       if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of " &
          // new%name // " and the reference node " // to_text(scene%node%label(new%reference)) &

@@ -4,7 +4,7 @@ module emcon_deck_sets
       get_integer, get_name, is_label, next_line, refuse_lines
    use emcon_deck_labels, only : find_label, label_map_t, label_range
    use emcon_deck_named, only : refuse_name, set_names
-   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
+   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t
    use emcon_diagnostics, only : add_warning, quoted, suggestion
    use emcon_mesh, only : named_set_t
    use emcon_name_index, only : name_index_find, name_index_put, name_index_t
@@ -286,13 +286,35 @@ contains
                      call append(builder%list(i_set), builder%list(other)%item(j))
                   end do
                else
-                  call refuse_name(reader, data, trim(builder%what) // " set", name, &
-                     set_names(builder%set(:builder%n)))
+                  call refuse_set(reader, data, builder, name)
                end if
             end if
          end do
       end do
    end subroutine read_entries
+
+   !> A set that no card before defines; a card below may.
+   subroutine refuse_set(reader, data, builder, name)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(builder_t), intent(in) :: builder
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            if (option_name(card, trim(builder%keyword)) /= name .or. name == "") cycle
+            if (all(card%name /= [character(len=7) :: builder%keyword, merge("NODE   ", &
+               "ELEMENT", builder%keyword == "NSET")])) cycle
+            call data_error(reader, data, trim(builder%what) // " set " // quoted(name) // &
+               " is defined below, in line " // to_text(card%origin%line) // &
+               "; put it before this card")
+         end associate
+         return
+      end do
+      call refuse_name(reader, data, trim(builder%what) // " set", name, &
+         set_names(builder%set(:builder%n)))
+   end subroutine refuse_set
 
    !> Data lines `first, last, step`.
    subroutine read_generated(reader, card, builder, i_set, map)

@@ -151,7 +151,7 @@ contains
          call init_element(self, scene, e, at_rest(k), mass(self%kind(e)), error)
          if (allocated(error)) return
       end do
-      call divide_laws(self, error)
+      call divide_laws(self, scene, error)
       if (allocated(error)) return
       call number_points(self)
    end subroutine solid_init
@@ -171,7 +171,7 @@ contains
          // "material " &
          // self%deck%material(scene%section(scene%element%section(e))%material)%text &
          // " is not known: it gives no stress normal to the plane; take ELASTIC, NEO HOOKE, " &
-         // "MOONEY-RIVLIN or YEOH, or plane strain, CPE")
+         // "COUPLED NEO HOOKE, MOONEY-RIVLIN or YEOH, or plane strain, CPE")
    end subroutine check_law
 
    !> The incompatible modes of element `e`, by the moduli of its law at rest.
@@ -203,8 +203,9 @@ contains
    end subroutine make_modes
 
    !> What laws are without their resistance to a change of volume, where elements ask for it.
-   subroutine divide_laws(self, error)
+   subroutine divide_laws(self, scene, error)
       type(solid_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       integer :: e, k
 
@@ -215,12 +216,12 @@ contains
             .or. allocated(self%rest(k)%law)) cycle
          if (allocated(self%law(k)%law)) call self%law(k)%law%divide(self%rest(k)%law)
          if (allocated(self%rest(k)%law)) cycle
-         call raise(error, err_input, "element " // to_text(self%deck%label(e)) &
-            // " takes the mean " &
-            // "change of volume, which the law given for material " &
-            // self%deck%material(k)%text // &
-            " does not tell apart; take " // trim(merge("C3D8 or C3D20", "CPE4 or CPE8 ", &
-            self%n_dim == n_space)))
+         call raise(error, err_input, where_text(scene, scene%element%origin(e)) // ": error: " &
+            // "element " // to_text(self%deck%label(e)) // " is of type " &
+            // trim(scene%element%kinds(self%kind(e))%name) // ", which takes the mean change of " &
+            // "volume; the law of material " // self%deck%material(k)%text &
+            // " cannot be split in this way; take " // trim(merge("C3D8 or C3D20", &
+            "CPE4 or CPE8 ", self%n_dim == n_space)))
          return
       end do
    end subroutine divide_laws

@@ -25,7 +25,7 @@ def check(path, *args, cwd=HERE):
     run = subprocess.run([EMCON, "check", str(path), *args], cwd=cwd, capture_output=True, timeout=60)
     messages = []
     for text in run.stderr.decode("utf-8", "replace").splitlines():
-        found = re.match(r"(?:emcon: )?" + re.escape(str(path)) + r":(?:(\d+):)? ((?:error|warning): .*)", text)
+        found = re.match(re.escape(str(path)) + r":(?:(\d+):)? ((?:error|warning): .*)", text)
         if found:
             messages.append((int(found[1] or 0), found[2]))
         elif re.match(r"(error|warning): |and \d+ more ", text):
