@@ -132,7 +132,7 @@ def test_examples_of_the_docs_in_c(installed: dict[str, str], tmp_path: Path) ->
 int main(void)
 {
    emcon_progress progress = NULL;
-   emcon_log log = NULL;
+   emcon_log show = NULL;
    void *user = NULL;
 """ + opening + "return status;\n}\n")
     run_example(tmp_path/"opening.c", "cc", "-std=c99", installed)
