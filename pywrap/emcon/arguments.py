@@ -18,12 +18,13 @@ def real_array(value: ArrayLike | None, name: str, shape: tuple[int, ...]) -> ND
     """Finite reals of the given shape, in C order; no copy of what is so already."""
     array = _array(value, name)
     if array.dtype.kind not in "fiu":
-        raise InputError(f"{name} is to hold real numbers, not {array.dtype}")
+        raise InputError(f"{name} is to hold real numbers, not {_content(array)}")
     _check_shape(array, name, shape)
     array = np.ascontiguousarray(array, dtype=np.float64).reshape(shape)
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{name} is not finite at {place}: {array[place]}")
+        where = f" at {place}" if place else ""
+        raise InputError(f"{name} is not finite{where}: {array[place]}")
     return array
 
 
@@ -31,7 +32,7 @@ def flag_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[n
     """Flags, True or False, as 1 and 0."""
     array = _array(value, name)
     if array.dtype.kind != "b":
-        raise InputError(f"{name} is to hold True and False, not {array.dtype}")
+        raise InputError(f"{name} is to hold True and False, not {_content(array)}")
     _check_shape(array, name, shape)
     return np.ascontiguousarray(array, dtype=np.int32)
 
@@ -40,8 +41,7 @@ def labels(value: ArrayLike, name: str) -> NDArray[np.int32]:
     """Whole numbers, one or a list of them, (n,)."""
     array = np.atleast_1d(_array(value, name))
     if array.dtype.kind not in "iu" and array.size or array.ndim > 1:
-        raise InputError(f"{name} is to be a whole number or a list of such, not "
-                         f"{array.ndim}-dimensional {array.dtype}")
+        raise InputError(f"{name} is to be a whole number or a list of such, not {value!r:.60}")
     if array.size and (array.min() < 0 or array.max() > _MOST):
         raise InputError(f"{name} is out of range: 0 to {_MOST}")
     return np.ascontiguousarray(array, dtype=np.int32)
@@ -75,6 +75,11 @@ def _array(value: ArrayLike | None, name: str) -> NDArray[Any]:
         return np.asarray(value)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} is no array: {error}") from error
+
+
+def _content(array: NDArray[Any]) -> str:
+    """What an array holds, in words."""
+    return "text" if array.dtype.kind in "SU" else str(array.dtype)
 
 
 def _check_shape(array: NDArray[Any], name: str, shape: tuple[int, ...]) -> None:

@@ -302,6 +302,8 @@ class Model(Source):
             raise InputError(f"material {name} has one law, not {len(given)}")
         text = card("MATERIAL", {"NAME": name})
         for chosen, values in given.items():
+            if isinstance(values, (int, float)):
+                values = (values,)
             numbers = list(values)
             kind, options = _law_card(name, chosen, len(numbers))
             text += card(kind, options, [numbers[k:k + 8] for k in range(0, len(numbers), 8)])

@@ -309,11 +309,14 @@ class Pairs:
         return f"Pairs({names}; {len(self.time)} times)"
 
 
-def read_pairs(paths: ResultPaths) -> Pairs | None:
+def read_pairs(result: ResultPaths | str | os.PathLike[str]) -> Pairs | None:
     """Totals of the contact pairs, /sets/PAIRS in NAME.h5; None if they are not there.
 
     They are written by `*CONTACT PRINT` with CF and TOTALS=YES or ONLY.
+
+    result   what `locate` returns, or what it takes: a base name or a file of the run
     """
+    paths = result if isinstance(result, ResultPaths) else locate(result)
     if not paths.history.is_file():
         return None
     with opened(paths.history) as file:

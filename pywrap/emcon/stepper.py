@@ -336,10 +336,14 @@ class Stepper(Queries, Conditions, Meshes):
         self._handle.__reduce__()
 
     def __repr__(self) -> str:
+        if not self._handle.address:
+            return "a closed Stepper"
         lines = [row["text"] for rows in self.report().values() for row in rows]
         return "\n".join([f"Stepper at time {self.time:g}", *lines])
 
     def _repr_html_(self) -> str:
+        if not self._handle.address:
+            return repr(self)
         parts = [f"<b>Stepper at time {self.time:g}</b>"]
         for kind, rows in self.report().items():
             cells = "".join(f"<tr><td>{html.escape(row['text'])}</td></tr>" for row in rows)

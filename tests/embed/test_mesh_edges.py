@@ -94,3 +94,8 @@ def test_cells_that_are_none_are_refused(cells: Any, message: str) -> None:
     nodes = [[0, 0], [1, 0], [1, 1], [0, 1], [2, 0]]
     with pytest.raises(MeshError, match=message):
         boundary_edges(nodes, cells)
+
+
+def test_no_mesh_of_the_plane_and_of_space() -> None:
+    with pytest.raises(MeshError, match="2 dimensions and one of 3"):
+        block() + block((0.0,)*3, (1.0,)*3, (1,)*3, "CUBE", kind="C3D8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 import subprocess
 import sys
 import threading
@@ -66,7 +67,7 @@ FIELDS: dict[str, tuple[object, str]] = {
     "nothing": (np.zeros((0, 2)), r"not \(0, 2\)"),
     "number": (1.0, r"not \(\)"),
     "complex": (ZERO + 0j, "real numbers, not complex128"),
-    "text": ([["a", "b"]]*4, "real numbers, not <U1"),
+    "text": ([["a", "b"]]*4, "real numbers, not text"),
     "objects": (np.full((4, 2), None), "real numbers, not object"),
     "flags": (np.ones((4, 2), dtype=bool), "real numbers, not bool"),
     "ragged": ([[0, 0], [0, 0, 0]], "no array"),
@@ -256,3 +257,29 @@ def test_no_memory_is_lost_in_2000_cycles(one: Path) -> None:
     assert done.returncode == 0, done.stderr
     first, last = map(int, done.stdout.split())
     assert last - first < 12               # pages: 50 bytes a cycle are as much
+
+
+def test_a_closed_stepper_shows_itself(one: Path) -> None:
+    """A debugger or a notebook may show it."""
+    stepper = Stepper(one)
+    stepper.close()
+    assert repr(stepper) == stepper._repr_html_() == "a closed Stepper"
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    ("a", "h is to hold real numbers, not text"), (np.nan, "h is not finite: nan"), (-1, "h is to be > 0, not -1")])
+def test_bad_numbers(one: Path, value: object, text: str) -> None:
+    with Stepper(one) as stepper, pytest.raises(InputError, match=f"^{text}$"):
+        stepper.step(value)
+
+
+@pytest.mark.parametrize("value", ["1", 1.5, [[1]]])
+def test_bad_whole_numbers(one: Path, value: object) -> None:
+    text = re.escape(f"a whole number or a list of such, not {value!r}")
+    with Stepper(one) as stepper, pytest.raises(InputError, match=text):
+        stepper.prescribe(1, value, 0.0)
+
+
+def test_one_constant_where_a_law_has_two() -> None:
+    with pytest.raises(InputError, match="elastic has 2 constants, not 1"):
+        Model().material("STEEL", elastic=3.0)

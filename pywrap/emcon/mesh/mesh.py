@@ -311,6 +311,8 @@ class Mesh:
         """
         if not isinstance(other, Mesh):
             return NotImplemented
+        if self.n_dim != other.n_dim:
+            raise MeshError(f"a mesh of {self.n_dim} dimensions and one of {other.n_dim} make no mesh")
         own = np.concatenate(list(self.element_labels.values()))
         new = np.concatenate(list(other.element_labels.values()))
         node = _shift(self.node_labels, other.node_labels)
