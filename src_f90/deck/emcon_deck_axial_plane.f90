@@ -75,9 +75,11 @@ contains
       end do
       if (.not. any(is_loose)) return
       i = findloc(is_loose, .true., 1)
-      call add_warning(reader%log, scene%node%origin(i), "node " &
-         // label_list(pack(scene%node%label, is_loose)) // " lies on the axis and may leave it; " &
-         // "hold its degree of freedom 1 by *BOUNDARY")
+      call add_warning(reader%log, scene%node%origin(i), "node" &
+         // trim(merge("s", " ", count(is_loose) > 1)) // " " &
+         // label_list(pack(scene%node%label, is_loose)) // trim(merge(" lie ", " lies", &
+         count(is_loose) > 1)) // " on the axis and may leave it; hold degree of freedom 1 there " &
+         // "by *BOUNDARY")
    end subroutine check_side
 
    !> Which nodes are held along the radius.

@@ -451,8 +451,10 @@ contains
       logical :: has_one(size(item))
 
       has_one = scene%element%section(item) > 0
-      if (any(has_one)) call card_error(reader, card, "element " &
-         // label_list(scene%element%label(pack(item, has_one))) // " has a section already")
+      if (any(has_one)) call card_error(reader, card, "element" &
+         // trim(merge("s", " ", count(has_one) > 1)) // " " &
+         // label_list(scene%element%label(pack(item, has_one))) &
+         // trim(merge(" have", " has ", count(has_one) > 1)) // " a section already")
       scene%element%section(item) = i_section
    end subroutine assign_section
 

@@ -39,11 +39,6 @@ module emcon_initial_contact
    !> Two polygons of one curve dip into each other by less than this, per edge, at blunt corners.
    real(wp), parameter :: deepest_dip = 0.2_wp
 
-   !> What to do where a master of faces, or of a shape, points away.
-   character(len=*), parameter :: &
-      of_faces = "; check the face labels                                            ", &
-      of_shape = "; turn the normal of its shape, or put the bodies on its other side"
-
 contains
 
    !> Move the nodes that ADJUST= names onto their surface and check every pair; the notes tell
@@ -286,10 +281,25 @@ contains
       else if (n_over > 0 .and. n_behind == n_over) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
             // title // " surface " // scene%surface(pair%master)%name // " point away from " // &
-            "surface " // scene%surface(pair%slave)%name // trim(merge(of_shape, of_faces, &
-            allocated(scene%surface(pair%master)%wall))))
+            "surface " // scene%surface(pair%slave)%name // remedy(scene, pair%master))
       end if
    end subroutine check_sides
+
+   !> What to do where a master points away.
+   pure function remedy(scene, master)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: master              !! 1..n_surface
+      character(len=:), allocatable :: remedy
+
+      if (allocated(scene%surface(master)%wall)) then
+         remedy = "; turn the normal of its shape, or put the bodies on its other side"
+      else if (scene%n_dim == n_space) then
+         remedy = "; check the face labels"
+      else
+         remedy = "; check the face labels; bodies lie to the left of edges (TYPE=EDGE) and to the " &
+            // "right of profiles (TYPE=SEGMENTS)"
+      end if
+   end function remedy
 
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
    pure logical function is_behind(scene, contact, i, gap, noise)
@@ -382,12 +392,23 @@ contains
       call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return
       if (scene%n_dim == n_space) call add_deepest(scene, contact, limit, found)
-      call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
-         " slave nodes of surface " // scene%surface(pair%slave)%name // " penetrate surface " // &
-         scene%surface(pair%master)%name // found // &
+      call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // &
+         deep_nodes(scene, pair, n) // scene%surface(pair%master)%name // found // &
          "; move them, or let *CONTACT PAIR, ADJUST= do it; where the overlap is meant, as of " // &
          "a press fit, begin with a *STATIC step with *CONTACT INTERFERENCE, SHRINK")
    end subroutine check_penetration
+
+   !> That `n` nodes of the slave penetrate a surface, whose name follows.
+   pure function deep_nodes(scene, pair, n) result(text)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      integer, intent(in) :: n                   !! > 0
+      character(len=:), allocatable :: text
+
+      text = to_text(n) // " slave node" // repeat("s", merge(1, 0, n > 1)) // " of surface " // &
+         scene%surface(pair%slave)%name // " penetrate" // repeat("s", merge(1, 0, n == 1)) // &
+         " surface "
+   end function deep_nodes
 
    !> Add the face that the deepest node is behind.
    subroutine add_deepest(scene, contact, limit, text)
@@ -434,8 +455,7 @@ contains
       if (n == 0) return
       associate (pair => scene%pair(i))
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // &
-            to_text(n) // " slave nodes of surface " // scene%surface(pair%slave)%name // &
-            " penetrate surface " // scene%surface(pair%master)%name // found // "; move them")
+            deep_nodes(scene, pair, n) // scene%surface(pair%master)%name // found // "; move them")
       end associate
    end subroutine check_given
 

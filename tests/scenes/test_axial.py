@@ -185,4 +185,4 @@ def test_it_is_told_what_is_free(tmp_path):
                                                "*NODE FILE\nU\n*END STEP\n"))
     found = run_deck(tmp_path/"deck.inp", tmp_path, code=3)
     assert "move in y" in found.errors and "move in x" not in found.errors
-    assert "node 1, 3 lies on the axis and may leave it" in found.errors
+    assert "nodes 1, 3 lie on the axis and may leave it" in found.errors
