@@ -296,8 +296,8 @@ contains
       else if (scene%n_dim == n_space) then
          remedy = "; check the face labels"
       else
-         remedy = "; check the face labels; bodies lie to the left of edges (TYPE=EDGE) and to the " &
-            // "right of profiles (TYPE=SEGMENTS)"
+         remedy = "; check the face labels; bodies lie to the left of edges (TYPE=EDGE) and to " &
+            // "the right of profiles (TYPE=SEGMENTS)"
       end if
    end function remedy
 
