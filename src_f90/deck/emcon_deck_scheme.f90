@@ -2,13 +2,14 @@
 module emcon_deck_scheme
    use emcon_deck_options, only : check_option
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t
-   use emcon_diagnostics, only : add_error
+   use emcon_diagnostics, only : add_error, add_warning
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_scheme, only : scheme_row_t, setting_t
    use emcon_scheme_registry, only : n_setting_range, scheme_user_row, scheme_row, &
       setting_range, setting_range_t
-   use emcon_steps, only : initiation_massless, initiation_velocity_update, step_t
+   use emcon_steps, only : initiation_massless, initiation_velocity_update, step_is_dynamic, &
+      step_t
    use emcon_text, only : read_real, squeezed, to_text
    implicit none
    private
@@ -77,6 +78,7 @@ contains
       type(step_t), intent(in) :: step(:)
       integer :: k
 
+      call warn_of_no_use(reader, step)
       do k = 1, size(step)
          associate (row => step(k)%scheme, initiation => step(k)%contact%initiation)
             if (initiation == initiation_massless .and. .not. row%takes_massless) call refuse( &
@@ -100,5 +102,21 @@ contains
       end subroutine refuse
 
    end subroutine check_schemes
+
+   !> A card of static steps after which no dynamic one comes.
+   subroutine warn_of_no_use(reader, step)
+      type(reader_t), intent(inout) :: reader
+      type(step_t), intent(in) :: step(:)
+      integer :: k
+
+      do k = 1, size(step)
+         if (step(k)%choice%origin%line == 0 .or. any(step_is_dynamic(step(k:)))) cycle
+         if (step(k)%choice%name == "") cycle     ! a TOLERANCE alone is refused in static steps
+         if (any(step(:k - 1)%choice%origin%line == step(k)%choice%origin%line .and. &
+            step(:k - 1)%choice%origin%file == step(k)%choice%origin%file)) cycle
+         call add_warning(reader%log, step(k)%choice%origin, "*TIME INTEGRATION: it has no " &
+            // "effect: no dynamic step follows")
+      end do
+   end subroutine warn_of_no_use
 
 end module emcon_deck_scheme
