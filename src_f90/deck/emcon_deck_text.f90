@@ -94,7 +94,7 @@ contains
       integer :: i_comma
 
       i_comma = index(text // ",", ",")
-      title = text(:i_comma - 1)
+      title = stripped(text(:i_comma - 1), blanks)
       name = squeezed(text(2:i_comma - 1))
       call split_options(text(i_comma:), option)
    end subroutine split_keyword
