@@ -177,17 +177,25 @@ contains
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: option
       character(len=:), allocatable, intent(out) :: name
+      character(len=:), allocatable :: fault
 
       name = option_name(card, option)
+      fault = ""
       if (name == "") then
          reader%doubt%names = .true.
          if (.not. has_option(card, option)) call card_error(reader, card, option // "= is missing")
       else if (len(name) > max_name) then
-         call card_error(reader, card, option // "=" // quoted(name) // " is longer than " &
-            // to_text(max_name) // " characters")
-         name = ""
-         reader%doubt%names = .true.
+         fault = " is longer than " // to_text(max_name) // " characters"
+      else if (scan(name(1:1), "'""") > 0) then
+         fault = " has a quote that is not closed"
+      else if (index(name, ",") > 0 .and. any(card%name == [character(len=7) :: "NODE", "NSET", &
+         "ELEMENT", "ELSET", "SURFACE"])) then
+         fault = ": commas separate the values of data lines, where this name would stand"
       end if
+      if (fault == "") return
+      call card_error(reader, card, option // "=" // quoted(name) // fault)
+      name = ""
+      reader%doubt%names = .true.
    end subroutine need_name
 
    !> Value of a parameter that counts, from `least` to `most`; unchanged if it is absent or wrong.
