@@ -364,8 +364,35 @@ contains
          reason = " (there is no *ASSEMBLY)"
       case ("INPUT")
          reason = " (use *INCLUDE)"
+      case default
+         reason = further_reason(name)
       end select
    end subroutine parameter_reason
+
+   !> Of parameters that other programs have: what to do without them.
+   pure function further_reason(name) result(reason)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: reason
+
+      select case (name)
+      case ("RIKS")
+         reason = " (*STATIC, STABILIZE goes on where a structure snaps through)"
+      case ("PERTURBATION")
+         reason = " (a step goes on from the state that it finds; leave it out)"
+      case ("INPUT")
+         reason = " (lines of other files come by *INCLUDE)"
+      case ("DEPENDENCIES")
+         reason = " (constants do not depend on temperature or fields)"
+      case ("FOLLOWER")
+         reason = " (forces keep their direction; pressures follow their faces)"
+      case ("COMPOSITE", "STRUCTURAL")
+         reason = " (damping is that of ALPHA and BETA)"
+      case ("SYSTEM")
+         reason = " (coordinates are those of the global axes)"
+      case default
+         reason = ""
+      end select
+   end function further_reason
 
    !> The supported parameters of a list, for suggestions.
    pure function parameter_names(parameters) result(list)

@@ -168,7 +168,7 @@ contains
          tie(n) = common
          tie(n)%origin = line_origin(reader, data%i_line)
          if (has_option(card, "TRANSLATION")) call read_translation(reader, data, tie(n)%map)
-         call get_surfaces(reader, data, scene, tie(n)%slave, tie(n)%master)
+         if (data%ok) call get_surfaces(reader, data, scene, tie(n)%slave, tie(n)%master)
          if (tie(n)%slave > 0 .and. tie(n)%master > 0) then
             call find_faces(reader, data, scene, tie(n))
             call check_sides(reader, data, scene, tie(n))
