@@ -18,7 +18,7 @@ def real_array(value: ArrayLike | None, name: str, shape: tuple[int, ...]) -> ND
     """Finite reals of the given shape, in C order; no copy of what is so already."""
     array = _array(value, name)
     if array.dtype.kind not in "fiu":
-        raise InputError(f"{name} is to hold real numbers, not {_content(array)}")
+        raise InputError(f"{name} is to hold real numbers, not {content(array)}")
     _check_shape(array, name, shape)
     array = np.ascontiguousarray(array, dtype=np.float64).reshape(shape)
     if not np.isfinite(array).all():
@@ -32,7 +32,7 @@ def flag_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[n
     """Flags, True or False, as 1 and 0."""
     array = _array(value, name)
     if array.dtype.kind != "b":
-        raise InputError(f"{name} is to hold True and False, not {_content(array)}")
+        raise InputError(f"{name} is to hold True and False, not {content(array)}")
     _check_shape(array, name, shape)
     return np.ascontiguousarray(array, dtype=np.int32)
 
@@ -77,7 +77,7 @@ def _array(value: ArrayLike | None, name: str) -> NDArray[Any]:
         raise InputError(f"{name} is no array: {error}") from error
 
 
-def _content(array: NDArray[Any]) -> str:
+def content(array: NDArray[Any]) -> str:
     """What an array holds, in words."""
     return "text" if array.dtype.kind in "SU" else str(array.dtype)
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .deck_text import field, set_text, table
+from .arguments import content
 from .errors import InputError
 
 _PACKAGE = os.path.dirname(os.path.abspath(__file__)) + os.sep
@@ -312,7 +313,7 @@ def whole(values: ArrayLike, what: str, shape: tuple[int | None, ...]) -> Number
         wanted = ", ".join("k" if n is None else str(n) for n in shape)
         raise InputError(f"{what}: an array of shape ({wanted}) is wanted, not {array.shape}")
     if array.dtype.kind not in "iu" and array.size:
-        raise InputError(f"{what}: whole numbers are wanted, not {array.dtype}")
+        raise InputError(f"{what}: whole numbers are wanted, not {content(array)}")
     return array.astype(np.int64)
 
 
@@ -320,7 +321,7 @@ def real(values: ArrayLike | None, what: str) -> NDArray[np.float64]:
     """Finite real numbers, as doubles."""
     array = array_of(values, what)
     if array.dtype.kind not in "fiu":
-        raise InputError(f"{what}: real numbers are wanted, not {array.dtype}")
+        raise InputError(f"{what}: real numbers are wanted, not {content(array)}")
     array = array.astype(np.float64)
     if not np.isfinite(array).all():
         place = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)

@@ -502,7 +502,11 @@ class Interface:
         select = self.select_candidates if together else self.select
         while outcome is None:
             n = select(u0, motion, active)
-            motion, lam, *sizes = newton(motion, n)
+            found = newton(motion, n)
+            if not isinstance(found, (tuple, list)) or len(found) < 2:
+                raise InputError("newton(du, n) is to return the motion and the multipliers, not "
+                                 f"{type(found).__name__}")
+            motion, lam, *sizes = found
             active, outcome = self.update_active(u0, motion, lam, active, *sizes)
         if outcome is not Outcome.DONE:
             raise AnalysisError(f"the step cannot be ended with these contacts: {outcome.name}")

@@ -150,3 +150,13 @@ def test_contacts_that_follow_from_others_are_told() -> None:
         motion, lam, active = face.solve_step(np.zeros((4, 2)), du, np.zeros(4, bool), newton, together=True)
     np.testing.assert_allclose(motion[2:], [[0.0, -0.1]]*2, rtol=0, atol=1e-15)
     assert active.any() and lam.sum() == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("found", [None, (np.zeros((4, 2)),)])
+def test_what_a_host_solves_is_checked(found: object) -> None:
+    with Interface(np.array([[-1.0, 0.0], [1.0, 0.0], [-0.3, 0.1], [0.3, 0.13]])) as face:
+        face.add_pair(face.add_surface("sole", [[2, 3]]), face.add_surface("floor", [[1, 0]]), "node to segment")
+        face.prepare(np.zeros((4, 2), bool))
+        none = np.zeros(face.n_contact, bool)
+        with pytest.raises(InputError, match="to return the motion and the multipliers, not"):
+            face.solve_step(np.zeros((4, 2)), np.zeros((4, 2)), none, lambda du, n: found)

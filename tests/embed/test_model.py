@@ -518,7 +518,7 @@ def test_model_goes_to_other_processes() -> None:
     ([0, 1], [[0, 1, 2]], r"\(n, 2\) or \(n, 3\) array"),
     ([[0, 0], [1, np.nan], [1, 1]], [[0, 1, 2]], "not finite: nan at"),
     ([[0, 0], [1, np.inf], [1, 1]], [[0, 1, 2]], "not finite: inf"),
-    ([["a", "b"]], [[0, 1, 2]], "real numbers"),
+    ([["a", "b"]], [[0, 1, 2]], "real numbers are wanted, not text"),
     ([[0, 0], [1j, 0], [1, 1]], [[0, 1, 2]], "real numbers"),
     ([[0, 0], [1], [1, 1]], [[0, 1, 2]], "nodes"),
     (SQUARE, [[0, 1]], r"\(m, 3\) or \(m, 4\)"),
