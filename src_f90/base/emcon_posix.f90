@@ -7,13 +7,16 @@ module emcon_posix
    implicit none
    private
    public :: c_access, c_close, c_dup2, c_errno, c_fclose, c_fileno, c_flock, c_fopen, c_fsync
-   public :: c_ftruncate, c_isatty, c_lseek, c_memfd_create, c_mkdir, c_read, c_rename, c_signal
-   public :: c_strerror, c_strlen, c_unlink, c_write
+   public :: c_ftruncate, c_isatty, c_lseek, c_memfd_create, c_mkdir, c_read, c_realpath
+   public :: c_rename, c_signal, c_strerror, c_strlen, c_unlink, c_write
    public :: lock_exclusive, lock_no_wait
+   public :: longest_path
    public :: errno_exists, errno_missing, errno_again, signal_file_size
 
    !> `LOCK_EX` and `LOCK_NB` of `flock`.
    integer(c_int), parameter :: lock_exclusive = 2, lock_no_wait = 4
+   !> `PATH_MAX` of Linux, with the zero at the end.
+   integer, parameter :: longest_path = 4096
    !> `EEXIST`, `ENOENT`, `EAGAIN` (what `flock` gives when the lock is held), `SIGXFSZ` on Linux.
    integer(c_int), parameter :: errno_exists = 17, errno_missing = 2, errno_again = 11
    integer(c_int), parameter :: signal_file_size = 25
@@ -102,6 +105,12 @@ module emcon_posix
          character(kind=c_char), intent(inout) :: buffer(*)
          integer(c_size_t), value :: n
       end function c_read
+
+      type(c_ptr) function c_realpath(path, resolved) bind(c, name="realpath")
+         import :: c_char, c_ptr
+         character(kind=c_char), intent(in) :: path(*)
+         character(kind=c_char), intent(out) :: resolved(*)   !! longest_path
+      end function c_realpath
 
       integer(c_int) function c_rename(from, to) bind(c, name="rename")
          import :: c_char, c_int

@@ -6,7 +6,8 @@ module emcon_run
    use emcon_deck_further, only : further_t
    use emcon_deck_keyword_list, only : keyword_lines
    use emcon_errors, only : err_analysis, err_file, err_input, err_interrupt, error_t, raise
-   use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
+   use emcon_files, only : file_exists, file_remove, is_same_file, make_directory, &
+      survive_file_size_limit
    use emcon_heap, only : heap_keep
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_lines, log_open, log_t
@@ -287,7 +288,7 @@ contains
    end subroutine move_diagnostics
 
    !> Is `path` the name of one of the results of `base`?
-   pure logical function is_result(path, base)
+   logical function is_result(path, base)
       character(len=*), intent(in) :: path, base
       character(len=*), parameter :: suffix(7) = [character(len=16) :: ".csv", ".h5", ".log", &
          ".json", ".vtkhdf", surfaces_suffix, ".rst.h5"]
@@ -295,7 +296,7 @@ contains
 
       is_result = .false.
       do i = 1, size(suffix)
-         is_result = is_result .or. path == base // trim(suffix(i))
+         is_result = is_result .or. is_same_file(path, base // trim(suffix(i)))
       end do
    end function is_result
 

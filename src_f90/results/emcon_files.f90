@@ -1,12 +1,12 @@
 !> Files with the guarantees that Fortran's own input and output does not give: one system call per
 !> text, every failure reported (a full disk too), atomic replacement, locks.
 module emcon_files
-   use, intrinsic :: iso_c_binding, only : c_associated, c_int, c_int64_t, &
+   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_int, c_int64_t, &
       c_intptr_t, c_null_char, c_null_ptr, c_ptr, c_size_t
    use emcon_errors, only : error_t, raise, err_file
    use emcon_posix, only : c_access, c_close, c_dup2, c_fclose, c_fileno, c_flock, &
       c_fopen, c_fsync, c_ftruncate, c_isatty, c_lseek, c_memfd_create, c_mkdir, c_read, &
-      c_rename, c_signal, c_unlink, c_write, &
+      c_realpath, c_rename, c_signal, c_unlink, c_write, longest_path, &
       lock_exclusive, lock_no_wait, errno_exists, errno_missing, errno_again, signal_file_size
    use emcon_text_file, only : system_errno, system_reason
    implicit none
@@ -14,7 +14,7 @@ module emcon_files
    public :: file_t, file_open, file_lock, file_put, file_put_at_start, file_get, file_sync, &
       file_truncate, file_close
    public :: file_exists, file_rename, file_remove, file_copy, file_discard, make_directory
-   public :: is_terminal, survive_file_size_limit
+   public :: is_same_file, is_terminal, survive_file_size_limit
 
    !> An open file. Nothing is buffered: what `file_put` has taken, a kill cannot lose.
    !>
@@ -149,6 +149,20 @@ contains
 
       file_exists = c_access(path // c_null_char, 0_c_int) == 0
    end function file_exists
+
+   !> Do two paths lead to one file? Each may be spelled in several ways.
+   logical function is_same_file(path, other)
+      character(len=*), intent(in) :: path, other
+      character(kind=c_char, len=longest_path) :: where, there
+
+      is_same_file = path == other
+      if (is_same_file) return
+      where = ""
+      there = ""
+      if (.not. c_associated(c_realpath(path // c_null_char, where))) return
+      if (.not. c_associated(c_realpath(other // c_null_char, there))) return
+      is_same_file = where(:index(where, c_null_char)) == there(:index(there, c_null_char))
+   end function is_same_file
 
    !> Give `from` the name `to`, in one instant; what was called `to` is gone then.
    subroutine file_rename(from, to, error)

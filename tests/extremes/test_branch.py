@@ -128,6 +128,16 @@ def test_results_are_not_overwritten(half, tmp_path):
     folder = half.file(".csv").parent
     done = emcon("restart", half.file(".rst.h5"), "--until", "2", "--output", folder)
     assert done.returncode == 2 and "would overwrite" in done.stderr
+    (tmp_path/"link").symlink_to(folder)
+    history = half.file(".csv").read_bytes()
+    for same in (f"{folder}/.", tmp_path/"link"):
+        done = emcon("restart", half.file(".rst.h5"), "--until", "2", "--output", same)
+        assert done.returncode == 2 and "would overwrite" in done.stderr
+    assert half.file(".csv").read_bytes() == history
+    deck = tmp_path/"ring.log"
+    deck.write_bytes((DECKS/"ring.inp").read_bytes())
+    done = emcon(deck, "--set", "t_end=0.02", "--output", f"{tmp_path}/.")
+    assert done.returncode == 2 and deck.read_bytes() == (DECKS/"ring.inp").read_bytes()
     done = emcon(DECKS/"ring.inp", "--until", "2", "--output", tmp_path)
     assert done.returncode == 2 and "emcon restart" in done.stderr
 
