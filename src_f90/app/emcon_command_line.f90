@@ -231,7 +231,7 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(28)
+      character(len=72) :: line(29)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
@@ -260,7 +260,8 @@ contains
          "          3 the analysis failed (results up to there are kept), or", &
          "            bodies overlap by more than a tenth of an edge, or the", &
          "            energy balance is off by more than 1e-6,", &
-         "          4 cannot write, 130 interrupted", &
+         "          4 a file cannot be written, or a restart file is damaged,", &
+         "          130 interrupted", &
          "decks:    docs/deck.md"]
    end function usage
 
