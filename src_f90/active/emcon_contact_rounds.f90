@@ -77,7 +77,7 @@ contains
       if (self%candidates%is_settled) then
          leads = .false.
          if (status == step_done .and. self%friction%looks_back) call friction_look_back( &
-            self%friction, system, self%set, motion, leads)
+            self%friction, system, self%set, motion, .false., leads)
          if (.not. leads) return
       end if
       if (size(system%contact) == 0) return
@@ -246,7 +246,7 @@ contains
          if (self%candidates%have_changed) cycle
          leads = .false.
          if (self%friction%looks_back) call friction_look_back(self%friction, system, self%set, &
-            motion, leads)
+            motion, .false., leads)
          if (.not. leads) return
       end do
       status = step_cycling
@@ -271,7 +271,7 @@ contains
       if (status /= step_done) return
       has_looked = has_looked .or. .not. self%candidates%have_changed
       if (.not. has_looked .or. .not. self%friction%looks_back .or. self%friction%lags) return
-      call friction_look_back(self%friction, system, self%set, motion, leads, .true.)
+      call friction_look_back(self%friction, system, self%set, motion, .true., leads)
       solve%early%is_made = solve%early%is_made .and. .not. leads
    end subroutine look_early
 

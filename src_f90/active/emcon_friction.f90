@@ -171,14 +171,14 @@ contains
    !> to be against the slip of the whole step, not that of its end. Those that a solved step stops
    !> or turns back are, and it is to be solved again; but of nodes of rigid bodies, whose slips
    !> over a step disagree by the square of its turn, by the jump of velocities that ends the step.
-   subroutine friction_look_back(self, system, set, motion, leads, is_early)
+   subroutine friction_look_back(self, system, set, motion, is_early, leads)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
       type(motion_t), intent(in) :: motion
-      logical, intent(out) :: leads              !! it is to be solved again
       !> The step is not solved to the end yet: whether jumps stop anything is told later
-      logical, intent(in), optional :: is_early
+      logical, intent(in) :: is_early
+      logical, intent(out) :: leads              !! it is to be solved again
       real(wp) :: du(size(motion%du, 1), size(motion%du, 2)), to_stop(most_slips)
       logical :: is_bound(size(motion%du, 2)), takes_jumps, by_jump
       integer :: i, k, pair
@@ -194,7 +194,7 @@ contains
                slip => set%item(k)%slip)
             if (.not. law%mu > 0.0_wp .or. any(abs(law%slip_to_stop) > 0.0_wp)) cycle
             by_jump = takes_jumps .and. all(is_bound(set%item(k)%node(:set%item(k)%n_node)))
-            if (by_jump .and. present(is_early)) cycle
+            if (by_jump .and. is_early) cycle
             to_stop = 0.0_wp
             to_stop(:self%n_slip) = contact%slip(i, motion%x, motion%u0, du)
             ! Of what sticks slip is round-off.

@@ -365,14 +365,14 @@ contains
       case ("INPUT")
          reason = " (use *INCLUDE)"
       case default
-         reason = further_reason(name)
+         call further_reason(name, reason)
       end select
    end subroutine parameter_reason
 
    !> Of parameters that other programs have: what to do without them.
-   pure function further_reason(name) result(reason)
+   pure subroutine further_reason(name, reason)
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: reason
+      character(len=:), allocatable, intent(out) :: reason
 
       select case (name)
       case ("RIKS")
@@ -392,7 +392,7 @@ contains
       case default
          reason = ""
       end select
-   end function further_reason
+   end subroutine further_reason
 
    !> The supported parameters of a list, for suggestions.
    pure function parameter_names(parameters) result(list)

@@ -255,6 +255,7 @@ contains
       real(wp), intent(in) :: noise              !! of coordinates [L]
       character(len=*), intent(in) :: title      !! what the deck calls the master of `pair`
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: remedy
       integer :: i, stride, n_over, n_behind, n_within
       real(wp) :: gap
       logical :: is_over
@@ -279,17 +280,18 @@ contains
             // scene%surface(pair%slave)%name // " and " // scene%surface(pair%master)%name // &
             ", and the first step cannot push them apart; take a thinner pad, or move them apart")
       else if (n_over > 0 .and. n_behind == n_over) then
+         call find_remedy(scene, pair%master, remedy)
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
             // title // " surface " // scene%surface(pair%master)%name // " point away from " // &
-            "surface " // scene%surface(pair%slave)%name // remedy(scene, pair%master))
+            "surface " // scene%surface(pair%slave)%name // remedy)
       end if
    end subroutine check_sides
 
    !> What to do where a master points away.
-   pure function remedy(scene, master)
+   pure subroutine find_remedy(scene, master, remedy)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: master              !! 1..n_surface
-      character(len=:), allocatable :: remedy
+      character(len=:), allocatable, intent(out) :: remedy
 
       if (allocated(scene%surface(master)%wall)) then
          remedy = "; turn the normal of its shape, or put the bodies on its other side"
@@ -299,7 +301,7 @@ contains
          remedy = "; check the face labels; bodies lie to the left of edges (TYPE=EDGE) and to " &
             // "the right of profiles (TYPE=SEGMENTS)"
       end if
-   end function remedy
+   end subroutine find_remedy
 
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
    pure logical function is_behind(scene, contact, i, gap, noise)
@@ -375,7 +377,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: limit(contact%n)
       integer :: i, n
-      character(len=:), allocatable :: found
+      character(len=:), allocatable :: found, text
 
       call contact%measure(scene)
       limit = merge(noise + contact%doubt, huge(noise), contact%facet > 0)
@@ -392,23 +394,23 @@ contains
       call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return
       if (scene%n_dim == n_space) call add_deepest(scene, contact, limit, found)
-      call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // &
-         deep_nodes(scene, pair, n) // scene%surface(pair%master)%name // found // &
+      call tell_deep(scene, pair, n, text)
+      call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // text // found // &
          "; move them, or let *CONTACT PAIR, ADJUST= do it; where the overlap is meant, as of " // &
          "a press fit, begin with a *STATIC step with *CONTACT INTERFERENCE, SHRINK")
    end subroutine check_penetration
 
-   !> That `n` nodes of the slave penetrate a surface, whose name follows.
-   pure function deep_nodes(scene, pair, n) result(text)
+   !> That `n` nodes of the slave penetrate the master.
+   pure subroutine tell_deep(scene, pair, n, text)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       integer, intent(in) :: n                   !! > 0
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
-      text = to_text(n) // " slave node" // repeat("s", merge(1, 0, n > 1)) // " of surface " // &
-         scene%surface(pair%slave)%name // " penetrate" // repeat("s", merge(1, 0, n == 1)) // &
-         " surface "
-   end function deep_nodes
+      text = " slave node of surface " // scene%surface(pair%slave)%name // " penetrates"
+      if (n > 1) text = " slave nodes of surface " // scene%surface(pair%slave)%name // " penetrate"
+      text = to_text(n) // text // " surface " // scene%surface(pair%master)%name
+   end subroutine tell_deep
 
    !> Add the face that the deepest node is behind.
    subroutine add_deepest(scene, contact, limit, text)
@@ -438,7 +440,7 @@ contains
       class(contact_t), allocatable :: contact
       real(wp) :: still(size(scene%x, 1), size(scene%x, 2))
       integer :: k, n
-      character(len=:), allocatable :: found
+      character(len=:), allocatable :: found, text
 
       k = 0
       if (present(host)) k = host_find_contact(host, i)
@@ -453,10 +455,9 @@ contains
       call find_behind(scene, contact%node, contact%state, merge(noise, huge(noise), &
          contact%state%is_near), n, found)
       if (n == 0) return
-      associate (pair => scene%pair(i))
-         call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // &
-            deep_nodes(scene, pair, n) // scene%surface(pair%master)%name // found // "; move them")
-      end associate
+      call tell_deep(scene, scene%pair(i), n, text)
+      call raise(error, err_input, where_text(scene, scene%pair(i)%origin) // ": error: " // text &
+         // found // "; move them")
    end subroutine check_given
 
    !> Master nodes behind the slave surface, as a corner between two slave nodes: an integrated gap

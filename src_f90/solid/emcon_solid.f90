@@ -219,7 +219,7 @@ contains
          call raise(error, err_input, where_text(scene, scene%element%origin(e)) // ": error: " &
             // "element " // to_text(self%deck%label(e)) // " is of type " &
             // trim(scene%element%kinds(self%kind(e))%name) // ", which takes the mean change of " &
-            // "volume; the law of material " // self%deck%material(k)%text &
+            // "volume; the law given for material " // self%deck%material(k)%text &
             // " cannot be split in this way; take " // trim(merge("C3D8 or C3D20", &
             "CPE4 or CPE8 ", self%n_dim == n_space)))
          return

@@ -41,7 +41,7 @@ module emcon_convergence
    integer, parameter :: kept_stalls = 4, kept_for_tangent = 2, too_old = 12
    !> Below this multiple of epsilon a correction that does not gain has met round-off, which large
    !> scenes have more of.
-   real(wp), parameter :: kept_floor = 64.0_wp*epsilon(1.0_wp)
+   real(wp), parameter :: kept_floor = 16.0_wp*epsilon(1.0_wp)
    real(wp), parameter :: nearly_done = 1.0e4_wp*epsilon(1.0_wp)
 
    !> With a kept factor, forces whose residual is smaller than this part of their sizes change by

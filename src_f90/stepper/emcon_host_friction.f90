@@ -203,7 +203,7 @@ contains
 
       leads = .false.
       if (.not. (active%friction%is_on .and. active%friction%n_slip > 1)) return
-      call friction_look_back(active%friction, system, active%set, motion, leads)
+      call friction_look_back(active%friction, system, active%set, motion, .false., leads)
       if (leads) call host_friction_turn(active, acts, system, turns)
    end subroutine host_friction_look_back
 

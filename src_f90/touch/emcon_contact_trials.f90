@@ -194,11 +194,7 @@ contains
       slope%pushes = pushes
       slope%row = pack([(j, j = 1, size(pushes))], pushes)
       slope%by_other = full(slope%row, pack([(j, j = 1, size(pushes))], .not. pushes))
-      if (all(pushes)) then
-         call dense_lu(full, slope%lu, is_singular)
-      else
-         call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
-      end if
+      call dense_lu(full(slope%row, slope%row), slope%lu, is_singular)
       slope%is_known = .not. is_singular
       slope%stays = slope%is_known
       slope%by = by

@@ -18,7 +18,7 @@ SOURCES = ["rods.f90", "pendulum.f90"]
 EPS = np.finfo(float).eps
 #: Of what does not gain any more so many roundings are left at most: `kept_floor` of
 #: emcon_convergence.
-FLOOR = 64
+FLOOR = 16
 # Two masses on two rods, the first about a fixed point, under their weight.
 PENDULUM = """*NODE, NSET=ALL
 1, 0., 0.

@@ -17,8 +17,9 @@ from embed_tools import WARNINGS, need, run  # noqa: E402
 SOURCES = ["theta_scheme.f90", "own_schemes.f90", "integrated.f90"]
 EPS = np.finfo(float).eps
 #: Of what does not gain any more so many roundings are left at most: `kept_floor` of
-#: emcon_convergence.
-FLOOR = 64
+#: emcon_convergence. Those of 30 steps add up to less than four times as many.
+FLOOR = 16
+SUM = 4*FLOOR
 # One element on rollers, fixed on the left: one linear oscillator, k = E, m = rho/3, omega = 3.
 OSCILLATOR = """*NODE, NSET=ALL
 1, 0., 0.
@@ -256,7 +257,7 @@ def test_contact_that_pushes_at_the_end(program: tuple[Path, dict[str, str]], tm
         assert left.min() >= -FLOOR*EPS
     else:
         assert energy[-1] < 0.99*energy[0]
-    assert np.abs(momentum.T - [-1., 0.]).max() <= FLOOR*EPS
+    assert np.abs(momentum.T - [-1., 0.]).max() <= SUM*EPS
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -283,7 +284,7 @@ def test_contact_leaves_momentum(program: tuple[Path, dict[str, str]], tmp_path:
     lines = run(program[0], path, "own", kind.replace(" ", ""), env=program[1]).splitlines()
     table = np.array([[float(word) for word in line.split()] for line in lines])
     momentum = table[:, 6:]
-    assert np.abs(momentum - [-1., 0.]).max() <= FLOOR*EPS
+    assert np.abs(momentum - [-1., 0.]).max() <= SUM*EPS
     assert table[-1, 2] > -0.9                      # the right block was stopped
 
 
