@@ -396,8 +396,8 @@ contains
       if (scene%n_dim == n_space) call add_deepest(scene, contact, limit, found)
       call tell_deep(scene, pair, n, text)
       call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // text // &
-         found // "; move them, or let *CONTACT PAIR, ADJUST= do it; where the overlap is meant, as of " // &
-         "a press fit, begin with a *STATIC step with *CONTACT INTERFERENCE, SHRINK")
+         found // "; move them, or let *CONTACT PAIR, ADJUST= do it; where the overlap is " // &
+         "meant, as of a press fit, begin with a *STATIC step with *CONTACT INTERFERENCE, SHRINK")
    end subroutine check_penetration
 
    !> That `n` nodes of the slave penetrate the master.
