@@ -47,6 +47,9 @@ module emcon_deck_step
    !> Increments of a step are counted in default integers, those that are cut too.
    real(wp), parameter :: most_increments = 0.5_wp*huge(1)
    character(len=*), parameter :: procedure_twice = "the step has a procedure already"
+   !> Cards that set what their parameters name, and nothing else.
+   character(len=*), parameter :: settings(*) = [character(len=17) :: "CONSTRAINTMETHOD", &
+      "CONTACTINITIATION", "MORTAR", "NEWTON", "TIMEINTEGRATION"]
    !> STABILIZE of *STATIC without a value, and at most.
    real(wp), parameter :: default_stabilization = 2.0e-4_wp, most_stabilization = 0.1_wp
 
@@ -152,6 +155,8 @@ contains
             cycle
          end if
          associate (card => reader%card(i))
+            if (size(card%option) == 0 .and. any(settings == card%name)) call card_warning(reader, &
+               card, "without a parameter it has no effect")
             select case (card%name)
             case ("STATIC", "DYNAMIC")
                call read_procedure(reader, card, step)
