@@ -49,7 +49,7 @@ module emcon_deck_step
    character(len=*), parameter :: procedure_twice = "the step has a procedure already"
    !> Cards that set what their parameters name, and nothing else.
    character(len=*), parameter :: settings(*) = [character(len=17) :: "CONSTRAINTMETHOD", &
-      "CONTACTINITIATION", "MORTAR", "NEWTON", "TIMEINTEGRATION"]
+      "CONTACTINITIATION", "NEWTON", "TIMEINTEGRATION"]
    !> STABILIZE of *STATIC without a value, and at most.
    real(wp), parameter :: default_stabilization = 2.0e-4_wp, most_stabilization = 0.1_wp
 

@@ -239,8 +239,9 @@ contains
          if (.not. step_is_dynamic(step)) call correction_take_modes(self%newton%correction, &
             rigid_modes(self%system%space%numbering, scene%x))
          state%base = factor_base_t()
+         ! In statics it saves tangents with contact: their factors have more entries.
          self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &
-            step_is_dynamic(step)
+            (step_is_dynamic(step) .or. self%system%n_constraint > 0)
          call begin_active(self%active, step)
          call suit_laws(self)
          if (.not. step_is_dynamic(step)) call contact_support_begin(self%active%support, &

@@ -160,12 +160,14 @@ contains
          if (self%system%n_constraint == 0 .and. correction%kept%is_made &
             .and. correction%kept%blocks%is_incomplete) call system_release_tangent(self%system)
          factor_policy%is_allowed = factor_policy%is_wanted &
-            .and. .not. self%active%near_laws%is_on &
+            .and. .not. (self%active%near_laws%is_on .or. self%active%support%is_needed) &
             .and. (correction%method == method_null_space .or. self%system%n_constraint == 0)
          if (self%active%friction%is_on) factor_policy%is_allowed = factor_policy%is_allowed &
             .and. active_set_may_turn(self%active, self%system)
-         ! What rubs or gives way is found by what each contact moves, which a factor tells.
+         ! What rubs or gives way is found by what each contact moves, which a factor tells; without
+         ! mass iterations take as many steps as a factor costs.
          call kept_factor_let_iterate(correction%kept, factor_policy%is_wanted .and. &
+            evaluation_has_inertia(self%scheme%evaluation(part%start, part%h)) .and. &
             (self%system%n_constraint == 0 .or. .not. (self%active%friction%is_on .or. &
             self%active%penalty%is_on .or. self%state%base%iterates_no_more)))
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &

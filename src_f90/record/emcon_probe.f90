@@ -205,11 +205,11 @@ contains
       megabytes = real(memory_most()/megabyte, wp)
       if (megabytes > 0.0_wp) call row_put(row, "memory_megabytes", megabytes, &
          ", # MB of memory")
-      associate (correction => stepper%march%newton%correction)
-         n_factor = max(correction%solver%n_factor, correction%definite_solver%n_factor)
+      associate (factors => stepper%march%newton%correction%factors)
+         n_factor = max(factors%general%n_factor, factors%definite%n_factor)
       end associate
       associate (kept => stepper%march%newton%correction%kept%blocks, &
-            solver => stepper%march%newton%correction%definite_solver)
+            solver => stepper%march%newton%correction%factors%definite)
          if (kept%is_incomplete) then
             call put_iterations(row, real(kept%n_entry, wp), real(kept%n_operation, wp))
          else if (solver%is_incomplete) then

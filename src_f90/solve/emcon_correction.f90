@@ -3,7 +3,7 @@
 !> Patterns and orderings are kept as long as the active constraints stand on the same unknowns.
 module emcon_correction
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
-   use emcon_constraints, only : constraint_set_t
+   use emcon_constraints, only : constraint_set_t, constraints_are_gradients
    use emcon_csr, only : csr_t
    use emcon_diagonal_blocks, only : blocks_let_threads
    use emcon_errors, only : error_t
@@ -11,15 +11,17 @@ module emcon_correction
    use emcon_kept_factor, only : kept_factor_free, kept_factor_set_up, kept_factor_t
    use emcon_kinds, only : dp, int64, wp
    use emcon_memory, only : memory_factors, memory_go_on, memory_take
-   use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
-      null_space_renew, null_space_solve, null_space_t, null_space_update, obstacle_fill, &
-      obstacle_none, obstacle_pivot
+   use emcon_null_space, only : null_space_factorise, null_space_free, null_space_init, &
+      null_space_multipliers, null_space_renew, null_space_solve, null_space_t, &
+      null_space_update, obstacle_fill, obstacle_none, obstacle_pivot
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_free, saddle_point_init, &
       saddle_point_reset, saddle_point_solve, saddle_point_t
    use emcon_solver_registry, only : solver_create, solver_default
-   use emcon_sparse_solver, only : matrix_definite, matrix_general, solver_renew, sparse_solver_t
+   use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    use emcon_steps, only : method_null_space
    use emcon_system, only : system_t
+   use emcon_tangent_factors, only : tangent_factors_create, tangent_factors_free, &
+      tangent_factors_make, tangent_factors_solve, tangent_factors_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    implicit none
    private
@@ -53,9 +55,7 @@ module emcon_correction
       integer :: n_factorisation = 0             !! made so far
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
       class(sparse_solver_t), allocatable :: user              !! by a program, for that choice
-      class(sparse_solver_t), allocatable :: solver            !! no active constraint
-      class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
-      logical, private :: is_definite = .false.  !! last factorisation: by that one
+      type(tangent_factors_t) :: factors         !! no active constraint
       type(layout_t), private :: layout
       type(null_space_t) :: null_space
       type(kept_factor_t) :: kept                !! over increments
@@ -84,12 +84,11 @@ contains
    subroutine make_solvers(self)
       type(correction_t), intent(inout) :: self
 
-      call solver_create(self%choice, matrix_general, self%solver, self%user)
-      call solver_create(self%choice, matrix_definite, self%definite_solver, self%user)
-      self%definite_solver%accuracy = newton_accuracy
-      call self%definite_solver%let_threads(self%kept%blocks%n_thread)
+      call tangent_factors_create(self%factors, self%choice, self%user)
+      self%factors%definite%accuracy = newton_accuracy
+      call self%factors%definite%let_threads(self%kept%blocks%n_thread)
       call kept_factor_set_up(self%kept, self%choice, self%user)
-      call solver_create(self%choice, matrix_general, self%null_space%solver, self%user)
+      call tangent_factors_create(self%null_space%factors, self%choice, self%user)
       call saddle_point_reset(self%saddle_point, self%choice, self%user)
    end subroutine make_solvers
 
@@ -99,7 +98,7 @@ contains
       integer, intent(in) :: n                   !! >= 1
 
       call blocks_let_threads(self%kept%blocks, n)
-      if (allocated(self%definite_solver)) call self%definite_solver%let_threads(n)
+      if (allocated(self%factors%definite)) call self%factors%definite%let_threads(n)
    end subroutine correction_let_threads
 
    !> Tell solvers of definite matrices which motions take hardly any energy.
@@ -107,18 +106,17 @@ contains
       type(correction_t), intent(inout) :: self  !! reset
       real(dp), intent(in) :: mode(:, :)         !! (n_unknown, any)
 
-      self%definite_solver%near_null = mode
+      self%factors%definite%near_null = mode
    end subroutine correction_take_modes
 
    !> Free what the solvers hold.
    subroutine correction_free(self)
       type(correction_t), intent(inout) :: self
 
-      if (.not. allocated(self%solver)) return
-      call self%solver%free()
-      call self%definite_solver%free()
+      if (.not. allocated(self%factors%general)) return
+      call tangent_factors_free(self%factors)
       call kept_factor_free(self%kept)
-      call self%null_space%solver%free()
+      call null_space_free(self%null_space)
       call saddle_point_free(self%saddle_point)
    end subroutine correction_free
 
@@ -271,10 +269,11 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical, intent(out) :: is_singular        !! there is no factor to solve with
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_symmetric                    ! the tangent with constraints
 
       self%n_factorisation = self%n_factorisation + 1
-      self%is_definite = .false.
-      if (.not. allocated(self%solver)) call make_solvers(self)
+      self%factors%is_definite = .false.
+      if (.not. allocated(self%factors%general)) call make_solvers(self)
       if (set%n_condition == 0) then
          call factorise_free(self, system, system%matrix, system%is_symmetric, is_singular, error)
          return
@@ -282,14 +281,16 @@ contains
       is_singular = .true.
       if (self%n_redundant > 0) return
       call merge_all(self, system, set)
+      is_symmetric = system%is_symmetric .and. constraints_are_gradients(set)
       if (set%n == 0) then
-         call factorise_free(self, system, self%layout%merged, .false., is_singular, error)
+         call factorise_free(self, system, self%layout%merged, is_symmetric, is_singular, error)
          return
       end if
       self%is_reduced = self%method == method_null_space .and. .not. set%penalty%is_on
       self%obstacle = obstacle_none
       if (self%is_reduced) then
-         call null_space_factorise(self%null_space, set, self%layout%merged, is_singular, error)
+         call null_space_factorise(self%null_space, set, self%layout%merged, is_symmetric, &
+            is_singular, error)
          if (allocated(error)) return
          self%obstacle = self%null_space%obstacle
          self%is_reduced = self%obstacle == obstacle_none
@@ -332,24 +333,11 @@ contains
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
 
-      is_singular = .true.
-      self%is_definite = .false.
       call memory_go_on(self%kept%memory)
-      if (is_symmetric) then
-         call self%definite_solver%analyse(matrix, error)
-         if (.not. allocated(error)) call solver_renew(self%definite_solver, matrix%value, error)
-         call memory_take(self%kept%memory, memory_factors)
-         if (allocated(error)) return
-         self%is_definite = .not. self%definite_solver%is_singular
-      end if
-      is_singular = .not. self%is_definite
-      if (self%is_definite) return
       ! Minimum degree fills matrices of tied pieces by a quarter more than the pieces need.
-      self%solver%seeks_less_fill = system%space%numbering%n_dependent > 0
-      call self%solver%analyse(matrix, error)
-      if (.not. allocated(error)) call solver_renew(self%solver, matrix%value, error)
+      self%factors%general%seeks_less_fill = system%space%numbering%n_dependent > 0
+      call tangent_factors_make(self%factors, matrix, is_symmetric, is_singular, error)
       call memory_take(self%kept%memory, memory_factors)
-      is_singular = self%solver%is_singular
    end subroutine factorise_free
 
    !> Is the symmetric tangent of a system positive definite along what the constraints of `set`
@@ -370,7 +358,8 @@ contains
       call correction_lay_out(self, system, set)
       if (self%n_redundant > 0 .or. .not. self%uses_null_space .or. set%n == 0) return
       call merge_all(self, system, set)
-      call null_space_factorise(self%null_space, set, self%layout%merged, is_singular, error)
+      call null_space_factorise(self%null_space, set, self%layout%merged, &
+         system%is_symmetric .and. constraints_are_gradients(set), is_singular, error)
       if (allocated(error) .or. self%null_space%obstacle /= obstacle_none) return
       if (self%null_space%n_free > 0) call try_matrix(self, self%null_space%reduced, is_minimum, &
          error)
@@ -397,7 +386,7 @@ contains
    pure logical function correction_is_lost(self)
       type(correction_t), intent(in) :: self
 
-      correction_is_lost = self%is_definite .and. .not. self%definite_solver%is_converged
+      correction_is_lost = self%factors%is_definite .and. .not. self%factors%definite%is_converged
    end function correction_is_lost
 
    !> The multipliers that belong to `residual` (without contact forces), where the null space tells
@@ -464,14 +453,8 @@ contains
 
       dlam = 0.0_wp
       if (set%n == 0) then
-         if (self%is_definite) then
-            self%definite_solver%accuracy = newton_accuracy
-      call self%definite_solver%let_threads(self%kept%blocks%n_thread)
-            if (present(accuracy)) self%definite_solver%accuracy = real(accuracy, dp)
-            call self%definite_solver%solve(residual, dq, error)
-         else
-            call self%solver%solve(residual, dq, error)
-         end if
+         self%factors%definite%accuracy = newton_accuracy
+         call tangent_factors_solve(self%factors, residual, dq, error, accuracy)
          dq = -dq
       else if (self%is_reduced) then
          call null_space_solve(self%null_space, set, self%layout%merged, residual, dq, error)

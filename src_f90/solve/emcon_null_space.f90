@@ -19,8 +19,9 @@ module emcon_null_space
    use emcon_kinds, only : dp, int64, wp
    use emcon_null_basis, only : null_basis_fill, null_basis_init, null_basis_pattern, null_basis_t
    use emcon_numbering, only : numbering_t
-   use emcon_solver_registry, only : solver_create, solver_default
-   use emcon_sparse_solver, only : matrix_general, solver_renew, sparse_solver_t
+   use emcon_solver_registry, only : solver_default
+   use emcon_tangent_factors, only : tangent_factors_create, tangent_factors_free, &
+      tangent_factors_make, tangent_factors_solve, tangent_factors_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
@@ -57,7 +58,7 @@ module emcon_null_space
       type(csr_t) :: d                           !! (n_unknown x n_free) DF
       type(csr_t) :: reduced                     !! P^T N DF
       type(triple_product_t) :: product
-      class(sparse_solver_t), allocatable :: solver
+      type(tangent_factors_t) :: factors         !! of that
       type(stopwatch_t) :: clock                 !! P, DF and P^T N DF
       integer, allocatable :: owner(:)           !! (n_unknown) constraint of a dependent one, or 0
       real(wp), allocatable :: rhs(:), x(:)      !! (n_free)
@@ -95,7 +96,7 @@ contains
    subroutine null_space_free(self)
       type(null_space_t), intent(inout) :: self
 
-      if (allocated(self%solver)) call self%solver%free()
+      call tangent_factors_free(self%factors)
    end subroutine null_space_free
 
    !> Make room for another pattern.
@@ -223,9 +224,8 @@ contains
       if (self%n_free == 0) return
       call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
       if (allocated(error)) return
-      if (.not. allocated(self%solver)) call solver_create(solver_default, matrix_general, &
-         self%solver)
-      call self%solver%analyse(self%reduced, error)
+      if (.not. allocated(self%factors%general)) call tangent_factors_create(self%factors, &
+         solver_default)
    end subroutine lay_out
 
    !> Lay out P and DF for the present choice.
@@ -253,10 +253,11 @@ contains
 
    !> Factorise P^T N DF for the gradients of the last `null_space_update`. Where the choice turns
    !> out as poor, `obstacle` tells.
-   subroutine null_space_factorise(self, set, matrix, is_singular, error)
+   subroutine null_space_factorise(self, set, matrix, is_symmetric, is_singular, error)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(csr_t), intent(in) :: matrix
+      logical, intent(in) :: is_symmetric        !! P^T N DF is, up to round-off
       logical, intent(out) :: is_singular        !! there is no factor to solve with
       type(error_t), allocatable, intent(out) :: error
 
@@ -274,8 +275,7 @@ contains
       if (.not. is_singular) return              ! the constraints alone tell where everything is
       call triple_product_update(self%product, self%p, matrix, self%d, self%reduced)
       call stopwatch_stop(self%clock)
-      call solver_renew(self%solver, self%reduced%value, error)
-      is_singular = self%solver%is_singular
+      call tangent_factors_make(self%factors, self%reduced, is_symmetric, is_singular, error)
    end subroutine null_space_factorise
 
    !> dq = DF du - [0; G1_d^-1 defect] with P^T N dq = -P^T residual: docs/theory.md, eq. (19).
@@ -293,7 +293,7 @@ contains
       call csr_multiply(matrix, self%part, self%image)
       self%image = -(residual + self%image)
       call csr_multiply_transposed(self%p, self%image, self%rhs)
-      call self%solver%solve(self%rhs, self%x, error)
+      call tangent_factors_solve(self%factors, self%rhs, self%x, error)
       if (allocated(error)) return
       call csr_multiply(self%d, self%x, dq)
       dq = dq + self%part

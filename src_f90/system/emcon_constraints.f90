@@ -19,10 +19,13 @@ module emcon_constraints
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_take_lam, constraints_normals, &
-      constraints_gives_back
+      constraints_gives_back, constraints_are_gradients
    public :: constraints_friction, constraints_add_law_forces, constraints_add_row_forces, &
       constraints_lam, constraints_dissipated
    public :: constraint_index, constraints_rounding, constraints_add_rounding
+
+   !> Gradients that are those of forces differ by no more than this part of the largest.
+   real(wp), parameter :: rounding = 64.0_wp*epsilon(1.0_wp)
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
    type :: soft_rows_t
@@ -149,6 +152,19 @@ contains
          call respond(self, k)
       end do
    end subroutine constraints_take_lam
+
+   !> Is the part of the tangent that conditions add symmetric, but for round-off? In equilibrium
+   !> they push along the gradients of their values; friction does not.
+   pure logical function constraints_are_gradients(self) result(are_gradients)
+      type(constraint_set_t), intent(in) :: self !! evaluated, with rows
+      integer :: n
+
+      are_gradients = .not. (self%frequency > 0.0_wp .or. any(self%item%has_friction))
+      if (self%n_row == 0 .or. .not. are_gradients) return
+      n = self%force_rows%row_start(self%n_row + 1)
+      are_gradients = all(abs(self%force_rows%value(:n) - self%gap_rows%value(:n)) &
+         <= rounding*maxval(abs(self%force_rows%value(:n))))
+   end function constraints_are_gradients
 
    !> Has condition `k` stored energy in steps before, which it gives back in this one?
    pure logical function constraints_gives_back(self, k) result(gives_back)

@@ -201,6 +201,7 @@ program main
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
    use test_system_kinds, only : collect_system_kinds
+   use test_tangent_factors, only : collect_tangent_factors
    use test_thin_stress, only : collect_thin_stress
    use test_tied_contact, only : collect_tied_contact
    use test_tie, only : collect_tie
@@ -388,6 +389,7 @@ program main
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
    call run("pushed_rows", collect_pushed_rows)
+   call run("tangent_factors", collect_tangent_factors)
    call run("saddle_point", collect_saddle_point)
    call run("lane_sums", collect_lane_sums)
    call run("mixing", collect_mixing)

@@ -80,7 +80,8 @@ contains
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle_none, "obstacle")
       if (allocated(error)) return
-      call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
+      call null_space_factorise(null_space, problem%set, problem%matrix, .false., is_singular, &
+         error)
       if (allocated(error)) return
       call check_true(error, .not. is_singular, "the reduced matrix is regular")
    end subroutine prepare
@@ -316,7 +317,8 @@ contains
       if (allocated(error)) return
       call check_near(error, dq(:, 2), dq(:, 1), 0.0_wp, 1.0_wp, "with the old factors")
 
-      call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
+      call null_space_factorise(null_space, problem%set, problem%matrix, .false., is_singular, &
+         error)
       if (allocated(error)) return
       call null_space_solve(null_space, problem%set, problem%matrix, problem%residual, dq(:, 2), &
          error)
@@ -326,7 +328,8 @@ contains
       call null_space_init(new, problem%set, size(problem%matrix%column), &
          problem%numbering)
       if (allocated(error)) return
-      call null_space_factorise(new, problem%set, problem%matrix, is_singular, error)
+      call null_space_factorise(new, problem%set, problem%matrix, .false., is_singular, &
+         error)
       if (allocated(error)) return
       call null_space_solve(new, problem%set, problem%matrix, problem%residual, dq(:, 3), error)
       if (allocated(error)) return
@@ -377,7 +380,8 @@ contains
          problem%numbering)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle, "obstacle")
-      call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
+      call null_space_factorise(null_space, problem%set, problem%matrix, .false., is_singular, &
+         error)
       if (allocated(error)) return
       call check_true(error, is_singular, "nothing is factorised")
       call null_space_free(null_space)
@@ -407,7 +411,8 @@ contains
          problem%numbering)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle_none, "obstacle at first sight")
-      call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
+      call null_space_factorise(null_space, problem%set, problem%matrix, .false., is_singular, &
+         error)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle_pivot, "obstacle")
       call null_space_free(null_space)

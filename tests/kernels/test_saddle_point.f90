@@ -84,7 +84,8 @@ contains
          call null_space_init(null_space, problem%set, size(problem%matrix%column), &
          problem%numbering)
          if (allocated(error)) return
-         call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
+         call null_space_factorise(null_space, problem%set, problem%matrix, .false., &
+            is_singular, error)
          if (allocated(error)) return
          call null_space_solve(null_space, problem%set, problem%matrix, &
             problem%residual - contact, dq(:, 2), error)
