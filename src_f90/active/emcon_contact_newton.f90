@@ -86,15 +86,15 @@ contains
    end subroutine contact_newton_solve
 
    !> Is a balance without inertia of so many contacts that it is best begun with all of them? Their
-   !> rows often follow from others there, and sets of them are tried in vain, each by a tangent;
-   !> the problem of all is solved by a factor that is kept.
+   !> rows often follow from others there, and sets of them are tried in vain, each by a tangent if
+   !> no factor is kept for them; the problem of all is solved by one.
    pure logical function contact_newton_suits(newton, motion, n_contact) result(suits)
       type(newton_t), intent(in) :: newton       !! begun
       type(motion_t), intent(in) :: motion
       integer, intent(in) :: n_contact           !! that act so far
 
       suits = evaluation_is_equilibrium(motion%evaluation) .and. n_contact >= several .and. &
-         factor_policy_may_provide(newton%factor_policy)
+         factor_policy_may_provide(newton%factor_policy) .and. .not. newton%factor_policy%is_allowed
    end function contact_newton_suits
 
    !> Free what solvers hold.
